@@ -155,7 +155,8 @@ typedef struct {
     // The offset of that line in samples per pixel. Default: 0.
     double audience_offset;
     // On which display the picture is seen and from how far, as text such as "desk" or
-    // "ppd=60,peak=300,black=0.3,ambient=100"; NULL (default) for "desk". Read by nf_session_new only.
+    // "ppd=60,peak=300,black=0.3,ambient=100"; "desk,fps=24" for a frame of a film whose noise is new in every
+    // frame. NULL (default) for "desk". Read by nf_session_new only.
     const char *viewing;
 } NfParams;
 

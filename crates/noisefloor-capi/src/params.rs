@@ -49,7 +49,8 @@ pub struct NfParams {
     /// The offset of that line in samples per pixel. Default: 0.
     pub audience_offset: f64,
     /// On which display the picture is seen and from how far, as text such as "desk" or
-    /// "ppd=60,peak=300,black=0.3,ambient=100"; NULL (default) for "desk". Read by nf_session_new only.
+    /// "ppd=60,peak=300,black=0.3,ambient=100"; "desk,fps=24" for a frame of a film whose noise is new in every
+    /// frame. NULL (default) for "desk". Read by nf_session_new only.
     pub viewing: *const c_char,
 }
 

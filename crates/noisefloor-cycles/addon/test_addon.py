@@ -289,6 +289,34 @@ class Addon(unittest.TestCase):
         self.assertTrue(pathlib.Path(scene.render.filepath + "0003-samples.png").exists())
         self.assertFalse(pathlib.Path(scene.render.filepath + "0002-samples.png").exists())
 
+    def test_animations_are_judged_as_films_and_stills_as_stills(self):
+        scene, judged, made = room(), [], settings.params
+
+        def record(*arguments):
+            params = made(*arguments)
+            judged.append(params.viewing.frames_per_second)
+            return params
+
+        scene.frame_start, scene.frame_end, scene.noisefloor.max_samples = 1, 2, 96
+        scene.render.fps, scene.render.fps_base = 24, 1.001
+        settings.params = record
+        try:
+            for animated in (True, False):
+                scene.cycles.use_animated_seed = animated
+                bpy.ops.render.render(animation=True)
+                self.assertEqual("23.976 frames a second" in hooks.state.summary, animated, hooks.state.summary)
+            scene.cycles.use_animated_seed = True
+            bpy.ops.render.render(animation=True)
+            both = [pixels(scene.render.frame_path(frame=frame_number)) for frame_number in (1, 2)]
+            scene.frame_set(2)
+            alone = rendered(scene)[0]
+        finally:
+            settings.params = made
+        # Each frame has a seed of its own, whatever was rendered before it
+        assert_same(both[1], alone, 96)
+        self.assertGreater(numpy.abs(both[0] - both[1]).max(), 0.01)
+        self.assertEqual(judged, [23.976, 23.976, None, None, 23.976, 23.976, None])
+
     def test_a_region_is_a_part_of_the_frame(self):
         scene = room()
         scene.noisefloor.max_samples = 96
@@ -426,7 +454,7 @@ class Addon(unittest.TestCase):
                         cycles.adaptive_threshold, cycles.seed = threshold * 2**0.5, seed
                         scene.noisefloor.use = False
                         pair.append(rendered(scene)[0][..., :3])
-                    params = addon_settings.still_params(scene, display.table(scene))
+                    params = settings.still_params(scene, display.table(scene))
                     ratios.append(noisefloor.excess(*pair, params=params).ratio)
                 self.assertLess(ratios[0], 1.2)
                 self.assertGreater(ratios[1], 1.2)
@@ -446,8 +474,7 @@ zipfile.ZipFile(arguments[0]).extractall(FOLDER)
 sys.path.insert(0, str(FOLDER))
 import noisefloor_addon
 import noisefloor
-from noisefloor_addon import denoise, display, frame, hooks
-from noisefloor_addon import settings as addon_settings
+from noisefloor_addon import denoise, display, frame, hooks, settings
 
 noisefloor_addon.register()
 result = unittest.main(argv=["test_addon.py", *arguments[1:]], exit=False).result

@@ -17,13 +17,16 @@
 //! What people would see is then built from fields that have the right shape: half the difference of the
 //! denoised halves, plus, of each scale of the mean residual, the share that both halves have in common.
 //!
+//! In a film whose frames have noise of their own, the variance is new in each frame, and the bias stands still: the
+//! vision model gets them apart.
+//!
 //! The vision model does not see the mean of a tile; `brightness.rs` compares it.
 
 use crate::bands::Plane;
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::DenoiseError;
 use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes, tune::Excess};
-use noisefloor_vision::{VisionError, VisionModel, VisionWorkspace};
+use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 
 /// What two residuals have in common is averaged over this many pixels to each side: 4,225 pixels in all, so
@@ -56,6 +59,8 @@ pub struct DenoisedError {
     size: (usize, usize),
     shown: Vec<f32>,
     residual: Vec<f32>,
+    /// What of the residual is the same in every frame of a film; empty for none.
+    standing: Vec<f32>,
     /// Of each pixel, for its brightness; empty where that is not in question.
     light: Vec<Light>,
     display: Display,
@@ -84,14 +89,15 @@ impl DenoisedError {
             .map(|i| displayed(display, noisy.map(|p| p[i]), denoised.map(|p| p[i])))
             .collect();
         let plane = |n: usize| Plane::new(size, all.iter().map(|pixel| pixel[n]).collect());
-        let mut residual = plane(1).values;
-        add_common(&mut residual, [plane(2), plane(3)]);
+        let (mut residual, mut standing) = (plane(1).values, vec![0.0; all.len()]);
+        add_common([&mut residual, &mut standing], [plane(2), plane(3)]);
         let light = |i: usize| Light::new(noisy.map(|p| p[i]), denoised.map(|p| p[i]));
         let light = (0..noisy[0].len()).map(light).collect();
-        Ok(Self { size, shown: plane(0).values, residual, light, display: *display })
+        Ok(Self { size, shown: plane(0).values, residual, standing, light, display: *display })
     }
 
-    /// The error of a picture whose truth is known, in the same form: for comparison.
+    /// The error of a picture whose truth is known, in the same form: for comparison. In a film, all of it is taken
+    /// to be new in every frame.
     ///
     /// # Errors
     /// [`DenoiseError::Pixels`] if a picture has another number of pixels than the size says.
@@ -108,7 +114,7 @@ impl DenoisedError {
         let shown: Vec<f32> = truth.iter().map(|&p| display.luma(p)).collect();
         let residual = picture.iter().zip(&shown).map(|(&p, truth)| display.luma(p) - truth).collect();
         let light = picture.iter().zip(truth).map(|(&p, &t)| Light::new([t; 2], [p; 2])).collect();
-        Ok(Self { size, shown, residual, light, display: *display })
+        Ok(Self { size, shown, residual, standing: Vec::new(), light, display: *display })
     }
 
     /// Width and height in pixels.
@@ -181,10 +187,7 @@ impl DenoisedError {
         eyes: &VisionModel,
         room: &mut VisionWorkspace,
     ) -> Result<f64, VisionError> {
-        let pairs = self.shown.iter().zip(&self.residual);
-        let test: Vec<Rgb> = pairs.map(|(shown, residual)| [shown + contrast * residual; 3]).collect();
-        let reference: Vec<Rgb> = self.shown.iter().map(|&shown| [shown; 3]).collect();
-        let lost = 10.0 - eyes.compare(&test, &reference, self.size, room)?.jod();
+        let lost = 10.0 - self.compare(contrast, eyes, room)?.jod();
         let height = shift(&self.light, &self.display);
         if height == 0.0 {
             return Ok(lost);
@@ -198,13 +201,14 @@ impl DenoisedError {
         let pixels = || tile.rows(self.size.0).flatten();
         let crop = |plane: &[f32]| pixels().map(|pixel| plane[pixel]).collect();
         let (shown, residual) = (crop(&self.shown), crop(&self.residual));
+        let standing = if self.standing.is_empty() { Vec::new() } else { crop(&self.standing) };
         let light = pixels().filter_map(|pixel| self.light.get(pixel).copied()).collect();
-        Self { size: (tile.width, tile.height), shown, residual, light, display: self.display }
+        Self { size: (tile.width, tile.height), shown, residual, standing, light, display: self.display }
     }
 
     /// A picture as displayed with this wrong with it, whose brightness is not in question.
     pub(crate) fn of(size: (usize, usize), shown: Vec<f32>, residual: Vec<f32>, display: &Display) -> Self {
-        Self { size, shown, residual, light: Vec::new(), display: *display }
+        Self { size, shown, residual, standing: Vec::new(), light: Vec::new(), display: *display }
     }
 
     /// A map of just-objectionable differences lost, row-major.
@@ -212,11 +216,26 @@ impl DenoisedError {
     /// # Errors
     /// [`VisionError`] if a side of the picture has less than two pixels.
     pub fn map_of_jods_lost(&self, eyes: &VisionModel) -> Result<Vec<f32>, VisionError> {
-        let pairs = || self.shown.iter().zip(&self.residual);
-        let test: Vec<Rgb> = pairs().map(|(shown, residual)| [shown + residual; 3]).collect();
-        let reference: Vec<Rgb> = self.shown.iter().map(|&shown| [shown; 3]).collect();
         let mut room = VisionWorkspace::default();
-        Ok(eyes.compare(&test, &reference, self.size, &mut room)?.map().to_vec())
+        Ok(self.compare(1.0, eyes, &mut room)?.map().to_vec())
+    }
+
+    /// The picture with its error, at `contrast` times its strength, against the picture without.
+    fn compare<'a>(
+        &self,
+        contrast: f32,
+        eyes: &VisionModel,
+        room: &'a mut VisionWorkspace,
+    ) -> Result<VisionComparison<'a>, VisionError> {
+        let with = |error: &[f32]| -> Vec<Rgb> {
+            self.shown.iter().zip(error).map(|(shown, error)| [shown + contrast * error; 3]).collect()
+        };
+        let (test, reference) =
+            (with(&self.residual), self.shown.iter().map(|&shown| [shown; 3]).collect::<Vec<_>>());
+        if self.standing.is_empty() || eyes.viewing().frames_per_second().is_none() {
+            return eyes.compare(&test, &reference, self.size, room);
+        }
+        eyes.compare_frame(&test, &with(&self.standing), &reference, self.size, room)
     }
 }
 
@@ -239,8 +258,8 @@ fn displayed(display: &Display, noisy: [Rgb; 2], denoised: [Rgb; 2]) -> Displaye
     [display.luma(mean), difference, residual(0), residual(1)]
 }
 
-/// Adds, scale by scale, the share of the mean of two residuals that they have in common.
-fn add_common(sum: &mut [f32], mut residuals: [Plane; 2]) {
+/// Adds to both sums, scale by scale, the share of the mean of two residuals that they have in common.
+fn add_common([sum, other]: [&mut [f32]; 2], mut residuals: [Plane; 2]) {
     for scale in 0..=SCALES {
         let [ra, rb] = &mut residuals;
         let part =
@@ -253,11 +272,14 @@ fn add_common(sum: &mut [f32], mut residuals: [Plane; 2]) {
         let (product, energy) =
             rayon::join(|| mean_of(|a, b| a * b), || mean_of(|a, b| 0.25 * (a + b) * (a + b)));
         let local = product.values.iter().zip(&energy.values);
-        for ((sum, (a, b)), (&common, &energy)) in sum.iter_mut().zip(pairs()).zip(local) {
+        let sums = sum.iter_mut().zip(other.iter_mut());
+        for (((sum, other), (a, b)), (&common, &energy)) in sums.zip(pairs()).zip(local) {
             // Chance makes the mean product negative, too: nothing in common then. The estimate is that much too
             // large on average where there is no bias; what it misses elsewhere makes up for it
             let share = if energy > 0.0 { (common / energy).clamp(0.0, 1.0).sqrt() } else { 0.0 };
-            *sum += share * 0.5 * (a + b);
+            let common = share * 0.5 * (a + b);
+            *sum += common;
+            *other += common;
         }
     }
 }

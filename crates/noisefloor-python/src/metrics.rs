@@ -110,7 +110,7 @@ fn restored(map: &PyReadonlyArray2<'_, f32>) -> DifferenceMap {
 ///
 /// Raises SizeError, ParameterError, and PictureError if a value is not finite or the pictures are too small.
 #[pyfunction]
-#[pyo3(signature = (image, reference, *, tone_mapping = None, key = 0.18, white = None, exposure = 1.0,
+#[pyo3(signature = (image, reference, *, tone_mapping = None, key = 0.18, white = None, exposure = None,
     viewing = None, encoding = "linear"))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn metrics(
@@ -120,7 +120,7 @@ pub(crate) fn metrics(
     tone_mapping: Option<ToneLike>,
     key: f32,
     white: Option<f32>,
-    exposure: f32,
+    exposure: Option<f32>,
     viewing: Option<ViewingLike>,
     encoding: &str,
 ) -> PyResult<PyMetrics> {

@@ -8,11 +8,12 @@ use pyo3::types::{PyDict, PyTuple};
 
 /// Viewing(conditions="desk") --
 ///
-/// A display, the light in the room, and how far away the display is.
+/// A display, the light in the room, how far away the display is, and whether it shows a still or a film.
 ///
 /// conditions is a preset ("desk", "laptop", "tv", "phone", "cinema", or a display of ColorVideoVDP such as
 /// "standard_4k"), numbers ("ppd=60,peak=300,black=0.3,ambient=100": pixels per degree, cd/m², cd/m², lux),
-/// or a preset with changes ("desk,distance=1.2": metres).
+/// or a preset with changes ("desk,distance=1.2": metres). "desk,fps=24" is for a frame of a film whose noise is
+/// new in every frame.
 ///
 /// Raises ParameterError if there are no such conditions, or a number is out of range.
 #[pyclass(frozen, eq, name = "Viewing", module = "noisefloor", from_py_object)]
@@ -51,6 +52,12 @@ impl PyViewing {
         self.0.params().ambient
     }
 
+    /// Frames per second of a film whose noise is new in every frame; None for a still.
+    #[getter]
+    fn frames_per_second(&self) -> Option<f64> {
+        self.0.frames_per_second()
+    }
+
     fn __getnewargs__(&self) -> (String,) {
         (self.0.to_string(),)
     }
@@ -68,8 +75,9 @@ impl PyViewing {
 ///
 /// tile: edge of a tile in pixels, 16 to 512; tiles of the last column and row have half to one and a half
 ///     times as many.
-/// tone_mapping: "reinhard" (None as well; exposure by the log-average of the picture, with key and white), "srgb"
-///     (with exposure, a factor on radiance), or a ToneTable (with exposure).
+/// tone_mapping: "reinhard" (None as well; with white, and exposure by key and the log-average of the picture), "srgb", or
+///     a ToneTable.
+/// exposure: a factor on radiance; 1 for "srgb" and tables by default. With "reinhard", frames of a film should have one.
 /// viewing: on which display the picture is seen, and from how far; a Viewing or its text.
 /// schedule: "spaced" by the expected need, "growing" by half of what a tile has (both in multiples of step),
 ///     or "every" step samples per pixel.
@@ -115,12 +123,17 @@ pub(crate) fn tone_mapping(
     tone: Option<ToneLike>,
     key: f32,
     white: Option<f32>,
-    exposure: f32,
+    exposure: Option<f32>,
 ) -> PyResult<ToneMapping> {
-    let tone = match tone {
+    let reinhard = match exposure {
         None => ToneMapping::Reinhard { key, white },
+        Some(exposure) => ToneMapping::ReinhardAt { exposure, white },
+    };
+    let exposure = exposure.unwrap_or(1.0);
+    let tone = match tone {
+        None => reinhard,
         Some(ToneLike::Table(table)) => ToneMapping::Custom { exposure, curve: table.curve },
-        Some(ToneLike::Name(name)) if name == "reinhard" => ToneMapping::Reinhard { key, white },
+        Some(ToneLike::Name(name)) if name == "reinhard" => reinhard,
         Some(ToneLike::Name(name)) if name == "srgb" => ToneMapping::Srgb { exposure },
         Some(ToneLike::Name(name)) => {
             return Err(ParameterError::new_err(format!(
@@ -135,7 +148,7 @@ pub(crate) fn tone_mapping(
 #[pymethods]
 impl PyParams {
     #[new]
-    #[pyo3(signature = (*, tile = 128, tone_mapping = None, key = 0.18, white = None, exposure = 1.0,
+    #[pyo3(signature = (*, tile = 128, tone_mapping = None, key = 0.18, white = None, exposure = None,
         viewing = None, schedule = "spaced", step = 8, min_spp = 16, max_spp = 10_000, consecutive = 1,
         audience = None))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -144,7 +157,7 @@ impl PyParams {
         tone_mapping: Option<ToneLike>,
         key: f32,
         white: Option<f32>,
-        exposure: f32,
+        exposure: Option<f32>,
         viewing: Option<ViewingLike>,
         schedule: &str,
         #[pyo3(from_py_with = whole)] step: u64,
@@ -220,6 +233,11 @@ impl PyParams {
             ToneMapping::Reinhard { key, white } => {
                 arguments.set_item("tone_mapping", "reinhard")?;
                 arguments.set_item("key", short(key))?;
+                arguments.set_item("white", white.map(short))?;
+            }
+            ToneMapping::ReinhardAt { exposure, white } => {
+                arguments.set_item("tone_mapping", "reinhard")?;
+                arguments.set_item("exposure", short(exposure))?;
                 arguments.set_item("white", white.map(short))?;
             }
             ToneMapping::Srgb { exposure } => {

@@ -342,6 +342,8 @@ class Errors(unittest.TestCase):
             (nf.ParameterError, "schedule", lambda: nf.Params(schedule="never")),
             (nf.ParameterError, "moon", lambda: nf.Viewing("moon")),
             (nf.ParameterError, "moon", lambda: nf.Params(viewing="moon")),
+            (nf.ParameterError, "frames per second", lambda: nf.Viewing("desk,fps=3")),
+            (nf.ParameterError, "exposure of Reinhard", lambda: nf.Params(exposure=0)),
             (nf.ParameterError, "share of people", lambda: nf.Oracle(1.0)),
             (nf.ModelError, "model", lambda: nf.Oracle(model=__file__)),
             (FileNotFoundError, "nowhere", lambda: nf.Oracle(model="/nowhere/at/all")),
@@ -504,6 +506,20 @@ class Processes(unittest.TestCase):
         self.assertEqual(session.stops(), alone.stops())
         np.testing.assert_array_equal(session.image(), alone.image())
 
+    def test_noise_of_a_film_is_seen_less_and_its_exposure_can_be_given(self):
+        still, film = nf.Viewing("desk"), nf.Viewing("desk,fps=60")
+        self.assertEqual((still.frames_per_second, film.frames_per_second), (None, 60))
+        lost = [10 - nf.metrics(noisy(1, 100), noisy(1, 1e8), viewing=seen).cvvdp_jod for seen in (still, film)]
+        self.assertLess(lost[1], 0.8 * lost[0])
+        # Shown as black, nobody sees noise
+        sessions = [nf.Session(64, 64, params=nf.Params(tile=EDGE, exposure=exposure)) for exposure in (None, 1e-6)]
+        for session in sessions:
+            for seed in (1, 2):
+                session.push_image(16, noisy(seed, 16, (64, 64, 3)))
+            session.judge()
+        self.assertEqual([all(session.verdict(tile).converged for tile in range(4)) for session in sessions],
+                         [False, True])
+
     def test_what_is_pickled_comes_back_the_same(self):
         session = nf.Session(64, 64, params=nf.Params(tile=EDGE, white=3.3))
         requests = session.requests()
@@ -513,7 +529,8 @@ class Processes(unittest.TestCase):
         finish(done := nf.Session(64, 64, params=PARAMS))
         values = [requests[0], requests[0].tile, session.verdict(0), done.stops()[0],
                   nf.Viewing("desk,distance=1.3"), nf.Params(white=3.3),
-                  nf.Params(tile=64, tone_mapping="srgb", exposure=0.3, audience=(1.5, 2), step=50)]
+                  nf.Params(tile=64, tone_mapping="srgb", exposure=0.3, audience=(1.5, 2), step=50),
+                  nf.Params(exposure=1.3, white=3, viewing="desk,fps=24")]
         for value in values:
             for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
                 self.assertEqual(pickle.loads(pickle.dumps(value, protocol)), value)

@@ -34,19 +34,22 @@ fn tile(c: &mut Criterion) {
     let rgb = ResidualPixels::Rgb { picture: &picture, residual: &residual };
     let grey = ResidualPixels::Grey { picture: &grey_picture, residual: &grey_residual };
     let model = VisionModel::new(&Viewing::default());
+    let of_film = VisionModel::new(&"desk,fps=24".parse().expect("viewing conditions"));
     let mut workspace = VisionWorkspace::default();
     let below = |colour, highest| VisionDetail { colour, frequencies: (1.0, highest) };
 
     let mut group = c.benchmark_group("tile of 128x128");
     group.throughput(Throughput::Elements((TILE * TILE) as u64));
-    for (name, pixels, detail) in [
-        ("colour, all bands", rgb, VisionDetail::FULL),
-        ("colour, above 1", rgb, below(true, 100.0)),
-        ("colour, 1 to 15", rgb, below(true, 15.0)),
-        ("light and dark, above 1", rgb, VisionDetail::FAST),
-        ("light and dark, 1 to 15", rgb, below(false, 15.0)),
-        ("of a grey picture, above 1", grey, VisionDetail::FAST),
-        ("of a grey picture, 1 to 15", grey, below(false, 15.0)),
+    for (name, model, pixels, detail) in [
+        ("colour, all bands", &model, rgb, VisionDetail::FULL),
+        ("colour, all bands, of a film", &of_film, rgb, VisionDetail::FULL),
+        ("of a grey picture in a film, above 1", &of_film, grey, VisionDetail::FAST),
+        ("colour, above 1", &model, rgb, below(true, 100.0)),
+        ("colour, 1 to 15", &model, rgb, below(true, 15.0)),
+        ("light and dark, above 1", &model, rgb, VisionDetail::FAST),
+        ("light and dark, 1 to 15", &model, rgb, below(false, 15.0)),
+        ("of a grey picture, above 1", &model, grey, VisionDetail::FAST),
+        ("of a grey picture, 1 to 15", &model, grey, below(false, 15.0)),
     ] {
         let inner = HALO..HALO + TILE;
         let patch = ResidualPatch { pixels, size: (edge, edge), columns: inner.clone(), rows: inner };

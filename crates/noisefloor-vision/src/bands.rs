@@ -3,8 +3,8 @@
 use crate::csf::{KNOTS, by_luminance};
 use crate::masking::{CHANNEL_GAINS, SENSITIVITY_DB};
 use crate::math::exp2;
-use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
+use crate::temporal::ALL_CHANNELS;
 use multiversion::multiversion;
 use std::f64::consts::LOG2_10;
 use std::ops::Range;
@@ -28,8 +28,8 @@ pub(crate) struct Curve {
 pub(crate) struct Bands {
     /// From the finest on; those that a picture is too small for go unused.
     pub(crate) frequencies: Vec<f64>,
-    pub(crate) curves: Vec<[Curve; CHANNELS]>,
-    pub(crate) baseband: [Curve; CHANNELS],
+    pub(crate) curves: Vec<[Curve; ALL_CHANNELS]>,
+    pub(crate) baseband: [Curve; ALL_CHANNELS],
 }
 
 impl Bands {
@@ -64,7 +64,7 @@ impl Bands {
     }
 }
 
-fn curves_of_baseband() -> [Curve; CHANNELS] {
+fn curves_of_baseband() -> [Curve; ALL_CHANNELS] {
     let mut curves = curves(BASEBAND, 1.0);
     // Its difference is not masked, and has no gain by channel
     for (curve, gain) in curves.iter_mut().zip(CHANNEL_GAINS) {
@@ -73,7 +73,7 @@ fn curves_of_baseband() -> [Curve; CHANNELS] {
     curves
 }
 
-fn curves(frequency: f64, contrast: f64) -> [Curve; CHANNELS] {
+fn curves(frequency: f64, contrast: f64) -> [Curve; ALL_CHANNELS] {
     std::array::from_fn(|channel| {
         let shift = SENSITIVITY_DB / 20.0 * LOG2_10 + (CHANNEL_GAINS[channel] * contrast).log2();
         let values = by_luminance(channel, frequency).map(|log10| (log10 * LOG2_10 + shift) as f32);

@@ -1,15 +1,15 @@
-//! Contrast sensitivity: castleCSF (Ashraf et al. 2024), as tabulated by ColorVideoVDP 0.5.7 for still
-//! patterns of fixed size.
+//! Contrast sensitivity: castleCSF (Ashraf et al. 2024), as tabulated by ColorVideoVDP 0.5.7 for patterns of
+//! fixed size, still ones and light that flickers at 5 Hz.
 
 use crate::math::log2;
-use crate::photometry::CHANNELS;
+use crate::temporal::ALL_CHANNELS;
 
 /// Knots along either axis of the table.
 pub(crate) const KNOTS: usize = 32;
 
-/// log₁₀ of the sensitivity as little-endian f32, by channel, then luminance, then frequency; both axes are
-/// logarithmic. From `csf_lut_weber_fixed_size.json`, MIT licence: `data/LICENSE-ColorVideoVDP`.
-static TABLE: &[u8; 4 * CHANNELS * KNOTS * KNOTS] = include_bytes!("../data/castlecsf.f32");
+/// log₁₀ of the sensitivity as little-endian f32, by channel (the transient one last), then luminance, then
+/// frequency; both axes are logarithmic. From `csf_lut_weber_fixed_size.json`, MIT licence: `data/LICENSE-ColorVideoVDP`.
+static TABLE: &[u8; 4 * ALL_CHANNELS * KNOTS * KNOTS] = include_bytes!("../data/castlecsf.f32");
 
 /// The frequencies of the table, from its first to its last, in cycles per degree. Its luminances are 0.005
 /// to 10,000 cd/m².

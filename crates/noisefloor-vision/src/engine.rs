@@ -2,10 +2,13 @@
 
 use crate::bands::{Bands, sensitivity, sensitivity_row};
 use crate::csf::{KNOTS, place};
-use crate::masking::{BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_row};
+use crate::masking::{
+    BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_row, transient_row,
+};
 use crate::part::Part;
-use crate::photometry::{Photometry, grey_row, opponent_row};
+use crate::photometry::{CHANNELS, Photometry, grey_row, opponent_row};
 use crate::pyramid::{Size, expand_row, reduce};
+use crate::temporal::{ALL_CHANNELS, TRANSIENT, gains};
 use crate::viewing::Viewing;
 use crate::workspace::VisionWorkspace;
 use multiversion::multiversion;
@@ -18,6 +21,8 @@ pub(crate) struct Engine {
     pub(crate) bands: Bands,
     masking: Masking,
     blur: Blur,
+    /// Gains of noise that is new in every frame, by channel; `None` for stills.
+    pub(crate) film: Option<[f32; ALL_CHANNELS]>,
 }
 
 impl Engine {
@@ -27,6 +32,7 @@ impl Engine {
             bands: Bands::new(viewing.pixels_per_degree()),
             masking: Masking::new(),
             blur: blur(),
+            film: viewing.frames_per_second().map(gains),
         }
     }
 
@@ -67,7 +73,26 @@ impl Engine {
         }
     }
 
-    /// Visible differences of a band, of `N` channels. Contrasts are worked out in the first part of it,
+    /// In a film, filters the test picture over time: what it has beside `standing`, or beside the reference, is new
+    /// in every frame.
+    pub(crate) fn filter<const N: usize>(&self, size: Size, standing: bool, workspace: &mut VisionWorkspace) {
+        let Some(gains) = self.film else { return };
+        let VisionWorkspace { gauss: [test, reference], flicker, standing: planes, .. } = workspace;
+        for channel in (0..N).rev() {
+            let same = if standing { &planes[channel] } else { &reference[channel][0] };
+            let pairs = test[channel][0].iter_mut().zip(same).take(size.area());
+            if channel == 0 {
+                for ((test, &same), flicker) in pairs.zip(&mut flicker[0]) {
+                    *flicker = gains[TRANSIENT] * (*test - same);
+                    *test = same + gains[0] * (*test - same);
+                }
+            } else {
+                pairs.for_each(|(test, &same)| *test = same + gains[channel] * (*test - same));
+            }
+        }
+    }
+
+    /// Visible differences of a band, of `N` channels and that of films. Contrasts are worked out in the first part of it,
     /// which has to have [`BLUR_RADIUS`] more pixels around, where there are any, than the second, in which
     /// differences are.
     pub(crate) fn band<const N: usize>(
@@ -88,9 +113,13 @@ impl Engine {
                 std::array::from_fn(|i| if blurs { reflected(y + i, size.height) } else { y });
             let smaller: [_; N] =
                 std::array::from_fn(|c| around.map(|y| &smaller[c][y * size.width..][columns.clone()]));
-            let mut rows = planes.iter_mut().map(|bands| &mut bands[band][y * size.width..][columns.clone()]);
-            let rows: [&mut [f32]; N] = std::array::from_fn(|_| rows.next().expect("at most three channels"));
-            mask_row(&self.masking, blurs.then_some(&self.blur), smaller, rows);
+            let [a, b, c, transient] = &mut *planes;
+            let mut still = [a, b, c].into_iter();
+            let rows: [_; N] = std::array::from_fn(|_| still.next().expect("at most three channels"));
+            let from = y * size.width;
+            let rows = rows.map(|bands| &mut bands[band][from..][columns.clone()]);
+            let transient = self.film.map(|_| &mut transient[band][from..][columns.clone()]);
+            mask_row(&self.masking, blurs.then_some(&self.blur), smaller, rows, transient);
         }
     }
 
@@ -104,7 +133,7 @@ impl Engine {
         blurs: bool,
         workspace: &mut VisionWorkspace,
     ) {
-        let VisionWorkspace { gauss, differences, smaller, rows, .. } = workspace;
+        let VisionWorkspace { gauss, flicker, differences, smaller, rows, .. } = workspace;
         for (channels, coarse) in gauss.iter().zip(&mut rows.coarse) {
             for (levels, coarse) in channels.iter().zip(coarse).take(N) {
                 expand_row(&levels[band + 1], size, y, &mut rows.narrow, coarse);
@@ -139,31 +168,49 @@ impl Engine {
                 contrast_row(test, reference, sensitivity, difference, smaller);
             }
         }
+        if self.film.is_some() {
+            expand_row(&flicker[band + 1], size, y, &mut rows.narrow, &mut rows.flicker);
+            let sensitivity = &mut rows.sensitivity[..columns.len()];
+            sensitivity_row(&self.bands.curves[band][TRANSIENT], places, sensitivity);
+            let noise = Row {
+                fine: &flicker[band][here.clone()],
+                coarse: &rows.flicker[columns.clone()],
+                background: &coarse[0][0][columns],
+            };
+            transient_row(noise, sensitivity, &mut differences[TRANSIENT][band][here]);
+        }
     }
 
     /// Visible differences of the coarsest level, beside its mean luminance.
     pub(crate) fn baseband(&self, band: usize, size: Size, workspace: &mut VisionWorkspace) {
-        let VisionWorkspace { gauss, differences, .. } = workspace;
+        let VisionWorkspace { gauss, flicker, differences, .. } = workspace;
         let planes = |of: usize, channel: usize| &gauss[of][channel][band][..size.area()];
         let [test, reference] = [0, 1].map(|of| {
             let sum: f64 = planes(of, 0).iter().map(|&v| f64::from(v.max(0.01))).sum();
             (sum / size.area() as f64) as f32
         });
         let place = place(reference).clamp(0.0, (KNOTS - 1) as f32);
-        for (channel, out) in differences.iter_mut().enumerate() {
+        for (channel, out) in differences[..CHANNELS].iter_mut().enumerate() {
             let s = sensitivity(&self.bands.baseband[channel], place);
             let pairs = planes(0, channel).iter().zip(planes(1, channel));
             for (out, (t, r)) in out[band].iter_mut().zip(pairs) {
                 *out = ((t / test).min(1000.0) - (r / reference).min(1000.0)).abs() * s;
             }
         }
+        if self.film.is_some() {
+            let s = sensitivity(&self.bands.baseband[TRANSIENT], place);
+            let noise = flicker[band][..size.area()].iter();
+            let out = differences[TRANSIENT][band].iter_mut();
+            out.zip(noise).for_each(|(out, noise)| *out = (noise / test).min(1000.0).abs() * s);
+        }
     }
 }
 
-/// Builds the coarser levels of both pictures.
-pub(crate) fn build<const N: usize>(sizes: &[Size], workspace: &mut VisionWorkspace) {
-    let VisionWorkspace { gauss, rows, .. } = workspace;
-    for levels in gauss.iter_mut().flat_map(|channels| &mut channels[..N]) {
+/// Builds the coarser levels of both pictures, in a film that of its flicker, too.
+pub(crate) fn build<const N: usize>(sizes: &[Size], film: bool, workspace: &mut VisionWorkspace) {
+    let VisionWorkspace { gauss, flicker, rows, .. } = workspace;
+    let of_stills = gauss.iter_mut().flat_map(|channels| &mut channels[..N]);
+    for levels in of_stills.chain(film.then_some(flicker)) {
         for (level, &size) in sizes[..sizes.len() - 1].iter().enumerate() {
             let (fine, coarse) = levels.split_at_mut(level + 1);
             reduce(&fine[level], size, &mut rows.narrow, &mut coarse[0]);

@@ -1,5 +1,5 @@
-//! What eyes see: how visible a difference between two still pictures is, on a given display, from a given
-//! distance.
+//! What eyes see: how visible a difference between two pictures is, on a given display, from a given distance;
+//! of stills, or of a still view in a film whose noise is new in every frame.
 //!
 //! The image path of ColorVideoVDP (Mantiuk et al. 2024) in Rust, with the constants of the PyPI package
 //! `cvvdp` 0.5.7 and its results: on 98 recorded pairs, JODs agree within 0.00003 and difference maps within
@@ -11,14 +11,15 @@
 //! | [`Chromaticities`] | its primaries and its white, where they are not those of sRGB |
 //! | [`PRESETS`], [`Screen`] | viewing conditions by name; pixels per degree of a screen |
 //! | [`VisionModel::compare`] | JODs and a map of two pictures |
+//! | [`VisionModel::compare_frame`] | the same in a film, of which some of the difference stands still |
 //! | [`VisionModel::residual`] | visible differences by band and channel in a tile, for stopping rules |
 //! | [`rescaled`] | the same for noise of another contrast, without computing it again |
 //! | [`VisionWorkspace`] | memory, used again from picture to picture |
 //! | [`contrast_sensitivity`] | castleCSF by channel, frequency and luminance |
 //!
 //! The steps, in the order of the data: `photometry.rs` (code values → cd/m² → opponent channels),
-//! `pyramid.rs`, `bands.rs` and `csf.rs` (contrast in units of its threshold), `masking.rs`, `pooling.rs`;
-//! `engine.rs` puts them together.
+//! `temporal.rs` (in films), `pyramid.rs`, `bands.rs` and `csf.rs` (contrast in units of its threshold),
+//! `masking.rs`, `pooling.rs`; `engine.rs` puts them together.
 //!
 //! ```
 //! use noisefloor_vision::{Viewing, VisionModel, VisionWorkspace};
@@ -55,6 +56,7 @@ mod presets;
 mod pyramid;
 mod residual;
 mod screen;
+mod temporal;
 mod text;
 mod viewing;
 mod workspace;

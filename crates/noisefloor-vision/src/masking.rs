@@ -4,6 +4,7 @@
 
 use crate::math::{exp2, pow};
 use crate::photometry::CHANNELS;
+use crate::temporal::{ALL_CHANNELS, TRANSIENT};
 use multiversion::multiversion;
 
 /// Exponent of the difference of contrasts.
@@ -16,15 +17,15 @@ pub(crate) const EPSILON: f32 = 1e-5;
 const MASK_GAIN: f32 = 0.160_141_13;
 /// Exponents of the masking contrasts, by channel.
 const MASK_EXPONENTS: [f32; CHANNELS] = [1.302_622_7, 2.888_590_8, 3.680_771_4]; // mask_q
-/// log₂ of how much the contrast of a channel (first index) masks another (second index); the columns of
-/// `xcm_weights` for still channels.
-const CROSS_MASKING: [[f32; CHANNELS]; CHANNELS] = [
-    [-0.189_501_05, -5.962_151, -4.318_346],
-    [2.565_559_4, 0.344_067_13, -2.719_646_5],
-    [3.811_837_2, -1.005_170_6, -0.519_337_65],
+/// log₂ of how much the contrast of a channel (first index) masks another (second index): `xcm_weights`,
+/// without the row of the transient channel, in which the reference has nothing that masks.
+const CROSS_MASKING: [[f32; ALL_CHANNELS]; CHANNELS] = [
+    [-0.189_501_05, -5.962_151, -4.318_346, -1.932_158_7],
+    [2.565_559_4, 0.344_067_13, -2.719_646_5, -0.497_042_48],
+    [3.811_837_2, -1.005_170_6, -0.519_337_65, -0.565_364_8],
 ];
 /// Sensitivity beside that of the table, by channel: −0.28 dB for all, and 1.45 for red–green.
-pub(crate) const CHANNEL_GAINS: [f64; CHANNELS] = [1.0, 1.45, 1.0];
+pub(crate) const CHANNEL_GAINS: [f64; ALL_CHANNELS] = [1.0, 1.45, 1.0, 1.0];
 /// Correction of all sensitivities, in dB.
 pub(crate) const SENSITIVITY_DB: f64 = -0.279_742_330_312_728_9;
 /// Weber contrasts above this are cut off.
@@ -82,6 +83,20 @@ pub(crate) fn contrast_row(
     }
 }
 
+/// Contrasts of noise in the transient channel, in units of the threshold: there, the reference is zero.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn transient_row(noise: Row<'_>, sensitivity: &[f32], difference: &mut [f32]) {
+    let n = difference.len();
+    let (fine, coarse, background) = (&noise.fine[..n], &noise.coarse[..n], &noise.background[..n]);
+    let sensitivity = &sensitivity[..n];
+    for x in 0..n {
+        let background = if background[x] > 0.01 { background[x] } else { 0.01 };
+        let contrast = (fine[x] - coarse[x]) / background;
+        let contrast = if contrast < LARGEST_CONTRAST { contrast } else { LARGEST_CONTRAST };
+        difference[x] = contrast.abs() * exp2(sensitivity[x]);
+    }
+}
+
 /// Blurs along a row that has [`BLUR_RADIUS`] more pixels at each end than `out`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn blur_row(blur: &Blur, padded: &[f32], out: &mut [f32]) {
@@ -121,7 +136,7 @@ pub(crate) fn safe_pow(x: f32, p: f32, offset: f32) -> f32 {
 /// How channels mask each other, with what is constant in it worked out.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Masking {
-    weights: [[f32; CHANNELS]; CHANNELS],
+    weights: [[f32; ALL_CHANNELS]; CHANNELS],
     offsets: [f32; CHANNELS],
     offset: f32,
 }
@@ -140,7 +155,8 @@ impl Masking {
 /// Most pixels of a row that are worked on at a time: few enough to stay in the nearest cache.
 const PIXELS: usize = 128;
 
-/// Turns differences of contrasts into visible differences, in `N` channels at once. `smaller[channel]` has
+/// Turns differences of contrasts into visible differences, in `N` channels at once, and in the transient one of
+/// a film. `smaller[channel]` has
 /// the rows of the masking contrast from [`BLUR_RADIUS`] above to as far below; `None` if the band is too
 /// small for a blur, in which case the middle row counts.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
@@ -148,9 +164,13 @@ pub(crate) fn mask_row<const N: usize>(
     masking: &Masking,
     blur: Option<&Blur>,
     smaller: [[&[f32]; 2 * BLUR_RADIUS + 1]; N],
-    mut differences: [&mut [f32]; N],
+    differences: [&mut [f32]; N],
+    transient: Option<&mut [f32]>,
 ) {
     let width = differences[0].len();
+    let mut channels = [const { None }; ALL_CHANNELS];
+    differences.into_iter().enumerate().for_each(|(channel, row)| channels[channel] = Some(row));
+    channels[TRANSIENT] = transient;
     let mut powers = [[0.0; PIXELS]; N];
     let mut mask = [0.0; PIXELS];
     for from in (0..width).step_by(PIXELS) {
@@ -164,7 +184,8 @@ pub(crate) fn mask_row<const N: usize>(
             let (exponent, offset) = (MASK_EXPONENTS[channel], masking.offsets[channel]);
             power.iter_mut().for_each(|value| *value = safe_pow(*value * MASK_GAIN, exponent, offset));
         }
-        for (channel, out) in differences.iter_mut().enumerate() {
+        for (channel, out) in channels.iter_mut().enumerate() {
+            let Some(out) = out else { continue };
             let mask = &mut mask[..n];
             mask.fill(1.0);
             for (power, weights) in powers.iter().zip(&masking.weights) {

@@ -3,14 +3,16 @@
 
 use crate::masking::{EPSILON, EXPONENT, grown};
 use crate::math::pow;
-use crate::photometry::CHANNELS;
+use crate::temporal::{ALL_CHANNELS, TRANSIENT_WEIGHT};
 use multiversion::multiversion;
 
 /// Weight of a still picture against a film of one second.
 pub(crate) const STILL: f64 = 0.577_918_291_091_919; // image_int
 /// Weights of the coarsest band, by channel.
-pub(crate) const BASEBAND: [f64; CHANNELS] =
-    [0.003_633_448_621_258_139_6, 1.662_772_417_068_481_4, 4.118_745_326_995_85];
+pub(crate) const BASEBAND: [f64; ALL_CHANNELS] =
+    [0.003_633_448_621_258_139_6, 1.662_772_417_068_481_4, 4.118_745_326_995_85, 25.259_698_867_797_85];
+/// Weights of channels.
+pub(crate) const WEIGHTS: [f64; ALL_CHANNELS] = [1.0, 1.0, 1.0, TRANSIENT_WEIGHT];
 const JOD_GAIN: f64 = 0.043_956_939_131_021_5; // jod_a
 const JOD_EXPONENT: f64 = 0.930_204_272_270_202_6; // jod_exp
 /// Up to this difference, JODs are linear in it.
@@ -46,31 +48,32 @@ pub(crate) fn over_pixels(sum: f64, pixels: usize) -> f64 {
     bent(sum / pixels as f64, 0.5)
 }
 
-/// Quality from what [`over_pixels`] gave, by band and channel; the last band is the coarsest.
-pub(crate) fn quality(bands: &[[f64; CHANNELS]]) -> f64 {
-    let mut channels = [0.0; CHANNELS];
+/// Quality from what [`over_pixels`] gave, by band and channel; the last band is the coarsest. `integration` is
+/// [`STILL`] for a still, without a transient channel, and 1 for a film, of which all frames are alike.
+pub(crate) fn quality(bands: &[[f64; ALL_CHANNELS]], integration: f64) -> f64 {
+    let mut channels = [0.0; ALL_CHANNELS];
     for (band, values) in bands.iter().enumerate() {
         for (channel, value) in values.iter().enumerate() {
             let weight = if band + 1 == bands.len() { BASEBAND[channel] } else { 1.0 };
-            channels[channel] += bent(value * weight, 4.0);
+            channels[channel] += bent(value * weight * WEIGHTS[channel], 4.0);
         }
     }
     let across: f64 = channels.iter().map(|&sum| bent(bent(sum, 0.25), 4.0)).sum();
-    10.0 - lost(bent(across, 0.25) * STILL)
+    10.0 - lost(bent(across, 0.25) * integration)
 }
 
 /// One difference from those of all channels, for the map; as many weights as channels.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-pub(crate) fn across_channels(
-    planes: [&[f32]; CHANNELS],
-    weights: [f32; CHANNELS],
+pub(crate) fn across_channels<const N: usize>(
+    planes: [&[f32]; N],
+    weights: [f32; N],
     share: f32,
     out: &mut [f32],
 ) {
     // [`bent`] with the powers of 4 and 1/4
     const FOURTH: f32 = EPSILON * EPSILON * EPSILON * EPSILON;
     let root = EPSILON.sqrt().sqrt();
-    out.fill(EPSILON - CHANNELS as f32 * FOURTH);
+    out.fill(EPSILON - N as f32 * FOURTH);
     for (plane, weight) in planes.into_iter().zip(weights) {
         for (out, value) in out.iter_mut().zip(plane) {
             let square = (value * weight + EPSILON) * (value * weight + EPSILON);
@@ -81,10 +84,16 @@ pub(crate) fn across_channels(
 }
 
 /// The map without that bend, of a residual whose contrast has changed by `growth` to the power of
-/// 1/[`EXPONENT`]: the mean of fourth order over channels, times `weight`.
+/// 1/[`EXPONENT`]: the mean of fourth order over channels, times `weight`; with the transient channel of a film.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-pub(crate) fn across_row<const N: usize>(planes: [&[f32]; N], growth: f32, weight: f32, out: &mut [f32]) {
-    if N == 1 {
+pub(crate) fn across_row<const N: usize>(
+    planes: [&[f32]; N],
+    transient: Option<&[f32]>,
+    growth: f32,
+    weight: f32,
+    out: &mut [f32],
+) {
+    if N == 1 && transient.is_none() {
         out.iter_mut().zip(planes[0]).for_each(|(out, &d)| *out = weight * grown(d, growth));
         return;
     }
@@ -94,6 +103,10 @@ pub(crate) fn across_row<const N: usize>(planes: [&[f32]; N], growth: f32, weigh
             let square = grown(d, growth) * grown(d, growth);
             *out += square * square;
         }
+    }
+    for (out, &d) in out.iter_mut().zip(transient.unwrap_or_default()) {
+        let square = (TRANSIENT_WEIGHT as f32 * grown(d, growth)).powi(2);
+        *out += square * square;
     }
     out.iter_mut().for_each(|out| *out = weight * out.sqrt().sqrt());
 }
@@ -114,7 +127,10 @@ mod tests {
 
     #[test]
     fn nothing_to_see_is_ten() {
-        assert_eq!(quality(&[[0.0; CHANNELS]; 5]), 10.0);
+        assert_eq!(
+            [STILL, 1.0].map(|integration| quality(&[[0.0; ALL_CHANNELS]; 5], integration)),
+            [10.0; 2]
+        );
     }
 
     #[test]

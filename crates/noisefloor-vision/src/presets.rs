@@ -48,6 +48,7 @@ impl ViewingPreset {
             reflectivity: REFLECTIVITY,
             eotf: self.eotf,
             primaries: self.primaries,
+            frames_per_second: None,
         }
     }
 }

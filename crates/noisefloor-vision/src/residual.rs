@@ -11,6 +11,7 @@ use crate::part::Part;
 use crate::photometry::CHANNELS;
 use crate::pooling::{STILL, across_row, energy_row};
 use crate::pyramid::Size;
+use crate::temporal::TRANSIENT;
 use crate::workspace::{Sizes, VisionWorkspace};
 use std::ops::Range;
 
@@ -73,6 +74,7 @@ pub struct VisibleDifference<'a> {
     sizes: Sizes,
     bands: Range<usize>,
     channels: usize,
+    film: bool,
     part: Part,
     frequencies: &'a [f64],
 }
@@ -115,7 +117,8 @@ impl VisionModel {
     /// How visible a residual is on its picture, where it is asked for. Allocates nothing once the workspace
     /// has grown to the patch.
     ///
-    /// Differences are those of [`VisionModel::compare`] before they are pooled, without its coarsest band,
+    /// In a film ([`crate::Viewing::frames_per_second`]), the residual is one of those that its frames have, each a new
+    /// one. Differences are those of [`VisionModel::compare`] before they are pooled, without its coarsest band,
     /// and without the constant 10⁻⁵ that makes its pooling over channels differentiable; so they follow
     /// [`rescaled`].
     ///
@@ -141,7 +144,8 @@ impl VisionModel {
         let bands = self.engine.bands.within(size, detail.frequencies);
         let colour = detail.colour && matches!(patch.pixels, ResidualPixels::Rgb { .. });
         let channels = if colour { CHANNELS } else { 1 };
-        let sizes = workspace.fit(size, bands.end + 1, channels);
+        let film = self.engine.film.is_some();
+        let sizes = workspace.fit(size, bands.end + 1, channels, film);
         load(&self.engine, patch, size, channels, workspace)?;
         if colour {
             differ::<CHANNELS>(&self.engine, &sizes, bands.clone(), part, workspace);
@@ -149,7 +153,7 @@ impl VisionModel {
             differ::<1>(&self.engine, &sizes, bands.clone(), part, workspace);
         }
         let frequencies = &self.engine.bands.frequencies[bands.clone()];
-        Ok(VisibleDifference { workspace, sizes, bands, channels, part, frequencies })
+        Ok(VisibleDifference { workspace, sizes, bands, channels, film, part, frequencies })
     }
 }
 
@@ -191,13 +195,13 @@ impl VisibleDifference<'_> {
     fn draw(&mut self, growth: f32, scale: f32) {
         let bands = self.bands.clone();
         if self.channels == 1 {
-            draw::<1>(&self.sizes, bands, self.part, (growth, scale), self.workspace);
+            draw::<1>(&self.sizes, bands, self.part, self.film, (growth, scale), self.workspace);
         } else {
-            draw::<CHANNELS>(&self.sizes, bands, self.part, (growth, scale), self.workspace);
+            draw::<CHANNELS>(&self.sizes, bands, self.part, self.film, (growth, scale), self.workspace);
         }
     }
 
-    /// The bands of a channel, finest first; none for chromatic channels that were not computed.
+    /// The bands of a channel, finest first, without the transient channel of a film; none for chromatic channels that were not computed.
     pub fn bands(&self, channel: OpponentChannel) -> impl Iterator<Item = DifferenceBand<'_>> {
         let planes = &self.workspace.differences[channel as usize];
         let bands = if (channel as usize) < self.channels { self.bands.clone() } else { 0..0 };
@@ -273,7 +277,8 @@ fn differ<const N: usize>(
     part: Part,
     workspace: &mut VisionWorkspace,
 ) {
-    build::<N>(sizes, workspace);
+    engine.filter::<N>(sizes[0], false, workspace);
+    build::<N>(sizes, engine.film.is_some(), workspace);
     for band in bands {
         let wanted = part.at(band).wider(MARGIN, sizes[band]);
         let around = wanted.wider(BLUR_RADIUS, sizes[band]);
@@ -286,6 +291,7 @@ fn draw<const N: usize>(
     sizes: &Sizes,
     bands: Range<usize>,
     part: Part,
+    film: bool,
     (growth, scale): (f32, f32),
     workspace: &mut VisionWorkspace,
 ) {
@@ -293,14 +299,53 @@ fn draw<const N: usize>(
     let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]);
     for band in bands.clone() {
         // The pyramid halves contrasts between its finest and its coarsest band
-        let weight = scale * STILL as f32 * if band == 0 { 1.0 } else { 0.5 };
+        let weight = scale * if film { 1.0 } else { STILL as f32 } * if band == 0 { 1.0 } else { 0.5 };
         for y in parts(band).rows() {
             let Range { start, end } = parts(band).columns();
             let here = y * sizes[band].width + start..y * sizes[band].width + end;
             let planes: [&[f32]; N] =
                 std::array::from_fn(|channel| &differences[channel][band][here.clone()]);
-            across_row(planes, growth, weight, &mut map[band][here]);
+            let transient = film.then(|| &differences[TRANSIENT][band][here.clone()]);
+            across_row(planes, transient, growth, weight, &mut map[band][here]);
         }
     }
     collapse(map, bands, sizes, |band| parts(band).rows(), &mut rows.narrow, &mut rows.places);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::viewing::Viewing;
+
+    /// All channels of a film, the transient one included, are those that the metric pools.
+    #[test]
+    fn a_residual_of_a_film_differs_as_its_frame_does() {
+        let model = VisionModel::new(&"desk,fps=24".parse::<Viewing>().unwrap());
+        let size = (96, 64);
+        let random = |i: usize| ((i as u32).wrapping_mul(0x9E37_79B1) >> 8) as f32 / (1 << 24) as f32;
+        let picture: Vec<[f32; 3]> = (0..96 * 64).map(|i| [0.3 + 0.2 * random(i / 7), 0.4, 0.5]).collect();
+        let test: Vec<[f32; 3]> = picture
+            .iter()
+            .enumerate()
+            .map(|(i, p)| std::array::from_fn(|c| p[c] + 0.1 * random(3 * i + c)))
+            .collect();
+        let residual: Vec<[f32; 3]> =
+            test.iter().zip(&picture).map(|(t, p)| std::array::from_fn(|c| t[c] - p[c])).collect();
+        let (mut whole, mut tile) = (VisionWorkspace::default(), VisionWorkspace::default());
+        model.compare(&test, &picture, size, &mut whole).unwrap();
+        let pixels = ResidualPixels::Rgb { picture: &picture, residual: &residual };
+        let patch = ResidualPatch { pixels, size, columns: 0..96, rows: 0..64 };
+        let bands = model.residual(&patch, VisionDetail::FULL, &mut tile).unwrap().bands;
+        for (channel, (whole, tile)) in whole.differences.iter().zip(&tile.differences).enumerate() {
+            for band in bands.clone() {
+                let pairs = || whole[band].iter().zip(&tile[band]);
+                let largest = pairs().map(|(a, _)| *a).fold(0.0, f32::max);
+                // The sum of picture and residual is rounded
+                assert!(
+                    largest > 0.0 && pairs().all(|(a, b)| (a - b).abs() < 1e-3 * largest),
+                    "{channel}, {band}"
+                );
+            }
+        }
+    }
 }

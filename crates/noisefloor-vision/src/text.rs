@@ -1,5 +1,5 @@
 //! Viewing conditions as text: `desk`, `standard_4k`, `ppd=60,peak=300,black=0.3,ambient=100`,
-//! `tv,distance=2`, `desk,primaries=p3,white=d50`.
+//! `tv,distance=2`, `desk,primaries=p3,white=d50`, `desk,fps=24`.
 
 mod colours;
 
@@ -13,7 +13,7 @@ use thiserror::Error;
 
 /// The keys of the text form.
 const KEYS: &str = "ppd, resolution, diagonal, distance, peak, black, contrast, ambient, reflectivity, eotf, \
-                    primaries, white";
+                    primaries, white, fps";
 
 /// Text that names no viewing conditions.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -62,6 +62,7 @@ struct Typed {
     eotf: Option<Eotf>,
     primaries: Option<[[f64; 2]; 3]>,
     white: Option<[f64; 2]>,
+    fps: Option<f64>,
 }
 
 impl Typed {
@@ -75,6 +76,7 @@ impl Typed {
             "contrast" => number(&mut self.contrast, key, value),
             "ambient" => number(&mut self.ambient, key, value),
             "reflectivity" => number(&mut self.reflectivity, key, value),
+            "fps" => number(&mut self.fps, key, value),
             "resolution" => set(&mut self.resolution, (key, value), "such as 1920x1080", resolution(value)),
             "eotf" => {
                 set(&mut self.eotf, (key, value), "srgb, pq, hlg, linear, or such as gamma2.2", eotf(value))
@@ -119,6 +121,7 @@ impl Typed {
             reflectivity: self.reflectivity.unwrap_or(of_base.reflectivity),
             eotf: self.eotf.unwrap_or(base.eotf),
             primaries: mixed.into(),
+            frames_per_second: self.fps,
         })
     }
 }
@@ -178,24 +181,33 @@ impl FromStr for Viewing {
 impl fmt::Display for Viewing {
     /// The name of the preset, or all numbers; reads back as the same conditions.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(preset) = PRESETS.iter().find(|preset| preset.viewing() == *self) {
-            return f.write_str(preset.name);
+        let still = self.of_still();
+        match PRESETS.iter().find(|preset| preset.viewing() == still) {
+            Some(preset) => f.write_str(preset.name)?,
+            None => write_numbers(f, &still.params())?,
         }
-        let ViewingParams { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries } =
-            self.params();
-        write!(
-            f,
-            "ppd={pixels_per_degree},peak={peak},black={black},ambient={ambient},reflectivity={reflectivity}"
-        )?;
-        match eotf {
-            Eotf::Srgb => Ok(()),
-            Eotf::Gamma(gamma) => write!(f, ",eotf=gamma{gamma}"),
-            Eotf::Pq => f.write_str(",eotf=pq"),
-            Eotf::Hlg => f.write_str(",eotf=hlg"),
-            Eotf::Linear => f.write_str(",eotf=linear"),
-        }?;
-        colours::write(f, primaries.chromaticities())
+        match self.frames_per_second() {
+            Some(rate) => write!(f, ",fps={rate}"),
+            None => Ok(()),
+        }
     }
+}
+
+/// The numbers of a display.
+fn write_numbers(f: &mut fmt::Formatter<'_>, params: &ViewingParams) -> fmt::Result {
+    let ViewingParams { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries, .. } = params;
+    write!(
+        f,
+        "ppd={pixels_per_degree},peak={peak},black={black},ambient={ambient},reflectivity={reflectivity}"
+    )?;
+    match eotf {
+        Eotf::Srgb => Ok(()),
+        Eotf::Gamma(gamma) => write!(f, ",eotf=gamma{gamma}"),
+        Eotf::Pq => f.write_str(",eotf=pq"),
+        Eotf::Hlg => f.write_str(",eotf=hlg"),
+        Eotf::Linear => f.write_str(",eotf=linear"),
+    }?;
+    colours::write(f, primaries.chromaticities())
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! What a picture is seen on, and from where: the display's light and its pixels per degree.
 
 use crate::chromaticity::{Chromaticities, ChromaticityError};
-use serde::{Deserialize, Serialize};
+use serde::ser::SerializeStruct;
+use serde::{Deserialize, Serialize, Serializer};
 use std::f64::consts::PI;
 use thiserror::Error;
 
@@ -60,7 +61,7 @@ impl From<Chromaticities> for Primaries {
 }
 
 /// Unchecked viewing conditions. [`ViewingParams::check`] makes them a [`Viewing`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct ViewingParams {
     /// Pixels per degree of visual angle in the centre of the picture, within 1…2000.
     pub pixels_per_degree: f64,
@@ -76,6 +77,28 @@ pub struct ViewingParams {
     pub eotf: Eotf,
     /// Their primaries and white.
     pub primaries: Primaries,
+    /// In a film whose noise is new in every frame, its frames per second; `None` for a still.
+    #[serde(default)]
+    pub frames_per_second: Option<f64>,
+}
+
+impl Serialize for ViewingParams {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        // Where fields have names, a still says nothing of films: digests of what was written before stay as they are
+        let says = self.frames_per_second.is_some() || !to.is_human_readable();
+        let mut fields = to.serialize_struct("ViewingParams", 7 + usize::from(says))?;
+        fields.serialize_field("pixels_per_degree", &self.pixels_per_degree)?;
+        fields.serialize_field("peak", &self.peak)?;
+        fields.serialize_field("black", &self.black)?;
+        fields.serialize_field("ambient", &self.ambient)?;
+        fields.serialize_field("reflectivity", &self.reflectivity)?;
+        fields.serialize_field("eotf", &self.eotf)?;
+        fields.serialize_field("primaries", &self.primaries)?;
+        if says {
+            fields.serialize_field("frames_per_second", &self.frames_per_second)?;
+        }
+        fields.end()
+    }
 }
 
 /// Viewing conditions that no display has.
@@ -109,6 +132,9 @@ pub enum ViewingError {
         "HLG displays above 1000 cd/m² need ambient light of at least 0.01 lux, on which their gamma depends"
     )]
     DarkHlg,
+    /// The frame rate is out of range.
+    #[error("a film must have 10…1000 frames per second, not {0}")]
+    FramesPerSecond(f64),
     /// No display mixes colours so.
     #[error(transparent)]
     Colours(#[from] ChromaticityError),
@@ -120,7 +146,16 @@ impl ViewingParams {
     /// # Errors
     /// The first value that is out of its range.
     pub fn check(self) -> Result<Viewing, ViewingError> {
-        let Self { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries } = self;
+        let Self {
+            pixels_per_degree,
+            peak,
+            black,
+            ambient,
+            reflectivity,
+            eotf,
+            primaries,
+            frames_per_second,
+        } = self;
         if !(1.0..=2000.0).contains(&pixels_per_degree) {
             return Err(ViewingError::PixelsPerDegree(pixels_per_degree));
         }
@@ -136,6 +171,10 @@ impl ViewingParams {
         if !(0.0..=1.0).contains(&reflectivity) {
             return Err(ViewingError::Reflectivity(reflectivity));
         }
+        // Slower ones do not show what the transient channel sees best, 5 Hz
+        if let Some(rate) = frames_per_second.filter(|rate| !(10.0..=1000.0).contains(rate)) {
+            return Err(ViewingError::FramesPerSecond(rate));
+        }
         match eotf {
             Eotf::Gamma(gamma) if !(1.0..=4.0).contains(&gamma) => return Err(ViewingError::Gamma(gamma)),
             Eotf::Hlg if peak > 1000.0 && ambient < 0.01 => return Err(ViewingError::DarkHlg),
@@ -147,10 +186,11 @@ impl ViewingParams {
     }
 }
 
-/// Checked viewing conditions: a display, the light in the room, and how far away the display is.
+/// Checked viewing conditions: a display, the light in the room, how far away the display is, and whether it shows
+/// a still or a film.
 ///
 /// As text, they are a preset (`desk`, `standard_4k`), numbers (`ppd=60,peak=300,black=0.3,ambient=100`), or
-/// a preset with changes (`desk,distance=1.2`, `desk,primaries=p3,white=d50`).
+/// a preset with changes (`desk,distance=1.2`, `desk,primaries=p3,white=d50`, `desk,fps=24`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "ViewingParams", into = "ViewingParams")]
 pub struct Viewing(ViewingParams);
@@ -178,6 +218,25 @@ impl Viewing {
     /// Pixels per degree of visual angle.
     pub fn pixels_per_degree(&self) -> f64 {
         self.0.pixels_per_degree
+    }
+
+    /// In a film whose noise is new in every frame, its frames per second; `None` for a still.
+    pub fn frames_per_second(&self) -> Option<f64> {
+        self.0.frames_per_second
+    }
+
+    /// The same display with a film of so many frames per second, or with a still.
+    ///
+    /// # Errors
+    /// Beyond 10…1000 frames per second.
+    pub fn with_frames_per_second(&self, frames_per_second: Option<f64>) -> Result<Self, ViewingError> {
+        ViewingParams { frames_per_second, ..self.0 }.check()
+    }
+
+    /// The same display with a still.
+    #[must_use]
+    pub fn of_still(&self) -> Self {
+        Self(ViewingParams { frames_per_second: None, ..self.0 })
     }
 
     /// The same display at `factor` times the distance. Exact for pixels that are small against the distance.

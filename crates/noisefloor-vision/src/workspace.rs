@@ -3,16 +3,21 @@
 use crate::masking::BLUR_RADIUS;
 use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
+use crate::temporal::{ALL_CHANNELS, TRANSIENT};
 use std::ops::Deref;
 
 /// Memory that a comparison needs. It grows to the largest picture it was used for: about 90 bytes a pixel in
-/// colour, 40 without. One for each thread.
+/// colour, 40 without; 25 more for frames of films. One for each thread.
 #[derive(Clone, Debug, Default)]
 pub struct VisionWorkspace {
     /// Levels of the Gaussian pyramid, finest first: by picture (test, reference), channel, level.
     pub(crate) gauss: [[Vec<Vec<f32>>; CHANNELS]; 2],
+    /// In a film, levels of the transient channel of the test picture; that of the reference is zero.
+    pub(crate) flicker: Vec<Vec<f32>>,
+    /// In a film, what is the same in every frame: by channel.
+    pub(crate) standing: [Vec<f32>; CHANNELS],
     /// Visible differences: by channel, band.
-    pub(crate) differences: [Vec<Vec<f32>>; CHANNELS],
+    pub(crate) differences: [Vec<Vec<f32>>; ALL_CHANNELS],
     /// The smaller contrast of a band, blurred along rows: by channel.
     pub(crate) smaller: [Vec<f32>; CHANNELS],
     /// The map: by band.
@@ -54,6 +59,7 @@ pub(crate) struct Rows {
     pub(crate) codes: Vec<[f32; 3]>,
     pub(crate) narrow: Vec<f32>,
     pub(crate) coarse: [[Vec<f32>; CHANNELS]; 2],
+    pub(crate) flicker: Vec<f32>,
     pub(crate) places: Vec<f32>,
     pub(crate) sensitivity: Vec<f32>,
     pub(crate) padded: Vec<f32>,
@@ -67,8 +73,8 @@ pub(crate) fn reserve(plane: &mut Vec<f32>, length: usize) {
 }
 
 impl VisionWorkspace {
-    /// Makes room for two pictures of `size` in this many channels and levels; returns their sizes.
-    pub(crate) fn fit(&mut self, size: Size, levels: usize, channels: usize) -> Sizes {
+    /// Makes room for two pictures of `size` in this many channels of a still, and levels; returns their sizes.
+    pub(crate) fn fit(&mut self, size: Size, levels: usize, channels: usize, film: bool) -> Sizes {
         let sizes = Sizes::new(size, levels);
         let levels = |planes: &mut Vec<Vec<f32>>| {
             planes.resize_with(sizes.len().max(planes.len()), Vec::new);
@@ -77,13 +83,17 @@ impl VisionWorkspace {
         self.gauss.iter_mut().flat_map(|channel| &mut channel[..channels]).for_each(levels);
         self.differences[..channels].iter_mut().for_each(levels);
         levels(&mut self.map);
+        if film {
+            [&mut self.flicker, &mut self.differences[TRANSIENT]].into_iter().for_each(levels);
+            self.standing[..channels].iter_mut().for_each(|plane| reserve(plane, size.area()));
+        }
         self.smaller[..channels].iter_mut().for_each(|plane| reserve(plane, size.area()));
         let width = size.width;
-        let Rows { codes, narrow, coarse, places, sensitivity, padded } = &mut self.rows;
+        let Rows { codes, narrow, coarse, flicker, places, sensitivity, padded } = &mut self.rows;
         if codes.len() < width {
             codes.resize(width, [0.0; 3]);
         }
-        coarse.iter_mut().flatten().chain([places, sensitivity]).for_each(|row| reserve(row, width));
+        coarse.iter_mut().flatten().chain([flicker, places, sensitivity]).for_each(|row| reserve(row, width));
         reserve(narrow, width + 4);
         reserve(padded, width + 2 * BLUR_RADIUS);
         sizes

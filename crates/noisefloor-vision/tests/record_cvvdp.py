@@ -8,6 +8,7 @@ record all of them again. The pictures are integers out of integers, so that bot
 """
 
 import json
+import math
 import platform
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 import torch
 from pycvvdp import cvvdp
 from pycvvdp.display_model import vvdp_display_geometry, vvdp_display_photo_eotf
+from pycvvdp.video_source import video_source_array
 
 U = np.uint32
 
@@ -52,18 +54,18 @@ def pattern(case, x, y):
             return (hashed((x // 3).astype(U), (y // 3).astype(U), 7, 1) >> U(24)).astype(np.int64)
 
 
-def picture(case, noisy):
-    """Code values, rows × columns × 3."""
+def picture(case, noises):
+    """Code values, rows × columns × 3, with these noises: of each, its amounts and its seed."""
     y, x = np.mgrid[0 : case["height"], 0 : case["width"]].astype(U)
     shape = pattern(case, x, y)
     channels = []
     for channel in range(3):
         low, high = case["low"][channel], case["high"][channel]
         code = low + (high - low) * shape // 255
-        if noisy:
-            amount = case["amount"][channel]
+        for amounts, seed in noises:
+            amount = amounts[channel]
             of = 0 if case["grey"] else channel
-            h = hashed(x // U(case["grain"]), y // U(case["grain"]), of, case["seed"])
+            h = hashed(x // U(case["grain"]), y // U(case["grain"]), of, seed)
             both_halves = (h & U(0xFFFF)).astype(np.int64) + (h >> U(16))
             code = code + both_halves * (2 * amount + 1) // 131071 - amount
         value = np.clip(code, 0, 255).astype(np.float32) / np.float32(255)
@@ -199,7 +201,8 @@ def cases():
 def record(case):
     """The case with its JOD, and of the map its mean, root mean square and an 8×8 sample, in JODs lost."""
     of = metric(case["viewing"])
-    test, reference = (torch.tensor(picture(case, noisy)) for noisy in (True, False))
+    noise = (case["amount"], case["seed"])
+    test, reference = (torch.tensor(picture(case, noises)) for noises in ([noise], []))
     jod, _ = of.predict(test, reference, dim_order="HWC")
     lost = 10 * of.raw[0, 0, 0].double().numpy()
     places = [[(2 * i + 1) * n // 16 for i in range(8)] for n in lost.shape]
@@ -211,6 +214,76 @@ def record(case):
         "mean": rounded(lost.mean()),
         "rms": rounded(np.sqrt((lost**2).mean())),
         "sample": [rounded(value) for value in sample],
+    }
+
+
+def films():
+    """Films of a still view with noise: `amount` is new in each frame, `standing` is the same in all of them."""
+    base = dict(
+        width=128, height=128, pattern="bowl", low=[40] * 3, high=[200] * 3, amount=[12] * 3, grain=1, grey=False,
+        scale=1, seed=1, viewing="standard_fhd", standing=[0] * 3, rate=24.0,
+    )  # fmt: skip
+    listed = []
+    for rate in (24.0, 25.0, 30.0, 60.0, 120.0):
+        listed.append(base | dict(rate=rate))
+        listed.append(base | dict(rate=rate, amount=[4] * 3, standing=[6] * 3, pattern="mosaic"))
+    for amount in (1, 4, 30):
+        listed.append(base | dict(amount=[amount] * 3))
+    for grain in (2, 4):
+        listed.append(base | dict(grain=grain, rate=60.0))
+    listed.append(base | dict(grey=True))
+    listed.append(base | dict(amount=[0] * 3, standing=[8] * 3))
+    listed.append(base | dict(low=[60, 30, 90], high=[120, 200, 140], amount=[3, 0, 20]))
+    listed.append(base | dict(width=301, height=201, pattern="bars"))
+    listed.append(base | dict(viewing="standard_4k"))
+    for number, case in enumerate(listed):
+        case["seed"] = 1000 * (number + 1)
+    return listed
+
+
+# Lengths of the filters that differences are averaged over, after one
+LENGTHS = 4
+
+
+def film(case):
+    """The case with JODs lost by the film in video mode, and by its first frame filtered for itself: the noise times
+    the norm of each channel's filter."""
+    of = metric(case["viewing"])
+    reference = picture(case, [])
+    noise = (case["standing"], case["seed"])
+    lead = int(math.ceil(0.25 * case["rate"] / 2) * 2)
+    standing = picture(case, [noise])
+    frames = [picture(case, [noise, (case["amount"], case["seed"] + 1 + i)]) for i in range((1 + LENGTHS) * lead)]
+    references = np.broadcast_to(reference, (len(frames), *reference.shape)).copy()
+    _, stats = of.predict(np.stack(frames), references, dim_order="FHWC", frames_per_second=case["rate"])
+
+    def lost(channels):
+        """As `do_pooling_and_jods` of a film, of whatever frames."""
+        weights = of.get_ch_weights(4).repeat(1, 1, 1, channels.shape[-1])
+        weights[:, :, 0, -1] *= of.baseband_weight[:4]
+        bands = of.lp_norm(channels * weights, of.beta_sch, dim=3, normalize=False)
+        across = of.lp_norm(bands, of.beta_tch, dim=1, normalize=False)
+        return 10 - float(of.met2jod(of.lp_norm(across, of.beta_t, dim=2, normalize=True).reshape(1)))
+
+    def opponent(code):
+        code = np.ascontiguousarray(code)
+        source = video_source_array(code, code, 0, dim_order="HWC", display_photometry=of.display_photometry)
+        return source.get_test_frame(0, device=of.device, colorspace="DKLd65")[:, :, 0]
+
+    gains = [float(taps.square().sum().sqrt()) for taps in of.F]
+    test, same, truth = map(opponent, (frames[0], standing, reference))
+    channels = torch.zeros((1, 8, 1, *test.shape[-2:]))
+    for channel in range(3):
+        channels[:, 2 * channel, 0] = same[:, channel] + gains[channel] * (test - same)[:, channel]
+        channels[:, 2 * channel + 1, 0] = truth[:, channel]
+    channels[:, 6, 0] = gains[3] * (test - same)[:, 0]
+    quality, of_map = of.process_block_of_frames(channels, (*test.shape[-2:], 2), 2, of.lpyr, False)
+    # A map of a film counts channels as that of a still does
+    return {
+        **case,
+        "video": round(lost(torch.as_tensor(stats["Q_per_ch"])[:, :, lead:]), 5),
+        "by_frame": round(lost(quality), 5),
+        "map_rms": float(f"{(100 * of_map.double().square().mean()).sqrt().item():.6g}"),
     }
 
 
@@ -229,8 +302,11 @@ def main():
     kept = before["pairs"] if before.get("versions") == head else []
     known = {key(pair): pair for pair in kept}
     recorded = [known.get(key(case)) or record(case) for case in cases()]
-    lines = ",\n".join(json.dumps(case, separators=(",", ":")) for case in recorded)
-    path.write_text(f'{{"versions": {json.dumps(head)}, "pairs": [\n{lines}\n]}}\n')
+    lines = lambda cases: ",\n".join(json.dumps(case, separators=(",", ":")) for case in cases)
+    path.write_text(
+        f'{{"versions": {json.dumps(head)}, "pairs": [\n{lines(recorded)}\n],\n"films": [\n'
+        f'{lines(map(film, films()))}\n]}}\n'
+    )
     print(f"{len(recorded)} pairs, {sum(key(case) in known for case in recorded)} of them from before")
 
 

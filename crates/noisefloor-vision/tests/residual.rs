@@ -268,3 +268,48 @@ fn bad_patches_are_refused() {
         assert!(found.map().pooled(4.0).is_finite());
     }
 }
+
+/// A tile of a film is a part of its frame, and a workspace does not remember it.
+#[test]
+fn films_have_parts_and_are_forgotten() {
+    let still = VisionModel::new(&Viewing::default());
+    let film = VisionModel::new(&"desk,fps=24".parse().unwrap());
+    let size = (128, 96);
+    let (picture, residual) = pictures(size.0, size.1, 0.05);
+    let pixels = ResidualPixels::Rgb { picture: &picture, residual: &residual };
+    let everywhere = (0..size.0, 0..size.1);
+    let test: Pixels =
+        picture.iter().zip(&residual).map(|(p, r)| std::array::from_fn(|i| p[i] + r[i])).collect();
+    let mut workspace = VisionWorkspace::default();
+    let jod = film.compare(&test, &picture, size, &mut workspace).unwrap().jod();
+    for detail in [VisionDetail::FULL, VisionDetail::FAST] {
+        let whole = map(&film, pixels, size, everywhere.clone(), detail);
+        let part = map(&film, pixels, size, (32..64, 16..80), detail);
+        let expected: Vec<f32> = (16..80).flat_map(|y| whole[y * size.0..][32..64].to_vec()).collect();
+        assert!(part == expected);
+    }
+
+    let again = still.compare(&test, &picture, size, &mut workspace).unwrap().jod();
+    assert_eq!(again, still.compare(&test, &picture, size, &mut VisionWorkspace::default()).unwrap().jod());
+    // What is new in every frame is averaged out; what stands still is not
+    let standing = film.compare_frame(&test, &test, &picture, size, &mut workspace).unwrap().jod();
+    assert!(standing < again && standing < jod, "standing {standing}, new {jod}, a still {again}");
+}
+
+/// Noise twice as strong has four times the energy in a film, too, whatever masks it.
+#[test]
+fn the_energy_of_a_film_grows_as_variance_does() {
+    let film = VisionModel::new(&"desk,fps=60".parse().unwrap());
+    let size = (96, 96);
+    let picture = vec![[0.5; 3]; size.0 * size.1];
+    let (_, residual) = pictures(size.0, size.1, 0.004);
+    let energy = |factor: f32| {
+        let residual: Pixels = residual.iter().map(|r| r.map(|v| factor * v)).collect();
+        let mut workspace = VisionWorkspace::default();
+        let patch = whole(&picture, &residual, size);
+        let mut found = film.residual(&patch, VisionDetail::FAST, &mut workspace).unwrap();
+        found.contrast_energy().pooled(1.0)
+    };
+    let grown = energy(2.0) / energy(1.0);
+    assert!((grown - 4.0).abs() < 0.04, "{grown}");
+}

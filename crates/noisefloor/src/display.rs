@@ -56,6 +56,15 @@ pub enum ToneMapping {
         /// From exposed radiance to display values.
         curve: ToneCurve,
     },
+    // Model files number the variants: new ones come last
+    /// The photographic operator with a given exposure, such as that of the first frame of a sequence: settled
+    /// anew, the exposures of frames differ by their noise, and the film flickers.
+    ReinhardAt {
+        /// Factor on linear radiance, above 0: the key over the log-average ([`Display::exposure`]).
+        exposure: f32,
+        /// As for [`ToneMapping::Reinhard`].
+        white: Option<f32>,
+    },
 }
 
 impl Default for ToneMapping {
@@ -92,8 +101,14 @@ impl ToneMapping {
             }
         };
         match *self {
-            Self::Reinhard { key, white } => {
-                positive("the key of Reinhard tone mapping", key)?;
+            Self::Reinhard { key: number, white } | Self::ReinhardAt { exposure: number, white } => {
+                let fixed = matches!(self, Self::ReinhardAt { .. });
+                let name = if fixed {
+                    "the exposure of Reinhard tone mapping"
+                } else {
+                    "the key of Reinhard tone mapping"
+                };
+                positive(name, number)?;
                 white.map_or(Ok(()), |w| positive("the white point of Reinhard tone mapping", w))
             }
             Self::Srgb { exposure } => positive("the sRGB exposure", exposure),
@@ -131,6 +146,7 @@ impl ToneMapping {
                 let Some(LogAverage { value, error }) = log_average() else { return known(1.0, curve) };
                 Settled { display: Display { exposure: (f64::from(key) / value) as f32, curve }, error }
             }
+            Self::ReinhardAt { exposure, white } => known(exposure, Curve::Reinhard { white }),
             Self::Srgb { exposure } => known(exposure, Curve::Clamp),
             Self::Custom { exposure, curve } => known(exposure, Curve::Custom(curve)),
         }
@@ -304,6 +320,20 @@ mod tests {
         assert!((display.map([0.0625; 3])[0] - srgb_decode(0.5)).abs() < 1e-6);
         assert_eq!(display.encode([f32::INFINITY, f32::NAN, f32::MAX]), [1.0, 0.0, 1.0]);
         assert!(ToneMapping::Custom { exposure: 0.0, curve }.check().is_err());
+    }
+
+    /// The operator that a picture settles, given to another picture, shows that one as the first.
+    #[test]
+    fn a_given_exposure_is_that_of_another_picture() {
+        let (first, second) = ([[0.5_f32; 3], [2.0; 3]], [[0.6_f32; 3], [2.2; 3]]);
+        let settled = ToneMapping::Reinhard { key: 0.18, white: Some(3.0) }.settle(&first);
+        let given = ToneMapping::ReinhardAt { exposure: settled.exposure(), white: Some(3.0) };
+        assert_eq!(given.check(), Ok(()));
+        assert_eq!(given.settle(&second), settled);
+        let error =
+            |exposure| ToneMapping::ReinhardAt { exposure, white: None }.check().unwrap_err().to_string();
+        assert!(error(0.0).starts_with("the exposure of Reinhard"), "{}", error(0.0));
+        assert!(error(f32::NAN).contains("NaN"));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::evidence::Evidence;
 use crate::oracle::Spread;
 use crate::params::Audience;
 use crate::svm::{Classifier, Machine, platt::from_log_odds};
-use noisefloor_vision::Viewing;
+use noisefloor_vision::{Eotf, Primaries, Viewing, ViewingError, ViewingParams};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
@@ -130,7 +130,7 @@ pub struct ModelParts {
     /// values, however these were made, and a session may display its picture in another way.
     pub tone_mapping: ToneMapping,
     /// On which display the training pictures were seen, and from how far. An assumption where nobody
-    /// recorded it, as with the bundled model's.
+    /// recorded it, as with the bundled model's. Of stills: people have judged no films.
     pub viewing: Viewing,
     /// From raw descriptors to probabilities.
     pub classifier: Classifier,
@@ -157,12 +157,52 @@ struct ModelFile<'a> {
     descriptor_version: u16,
     evidence: Evidence,
     tone_mapping: ToneMapping,
-    viewing: Viewing,
+    viewing: StillViewing,
     classifier: Cow<'a, Classifier>,
     familiarity: Cow<'a, Option<Familiarity>>,
     spread: Option<Spread>,
     audience: Audience,
     record: Cow<'a, TrainingRecord>,
+}
+
+/// The viewing conditions of a still as files hold them, whose fields have no names there.
+#[derive(Serialize, Deserialize)]
+struct StillViewing {
+    pixels_per_degree: f64,
+    peak: f64,
+    black: f64,
+    ambient: f64,
+    reflectivity: f64,
+    eotf: Eotf,
+    primaries: Primaries,
+}
+
+impl From<Viewing> for StillViewing {
+    fn from(viewing: Viewing) -> Self {
+        let ViewingParams { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries, .. } =
+            viewing.params();
+        Self { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries }
+    }
+}
+
+impl TryFrom<StillViewing> for Viewing {
+    type Error = ViewingError;
+
+    fn try_from(still: StillViewing) -> Result<Self, ViewingError> {
+        let StillViewing { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries } = still;
+        let frames_per_second = None;
+        ViewingParams {
+            pixels_per_degree,
+            peak,
+            black,
+            ambient,
+            reflectivity,
+            eotf,
+            primaries,
+            frames_per_second,
+        }
+        .check()
+    }
 }
 
 /// What a model says about one tile.
@@ -221,7 +261,7 @@ impl Model {
             descriptor,
             evidence: file.evidence,
             tone_mapping: file.tone_mapping,
-            viewing: file.viewing,
+            viewing: file.viewing.try_into().map_err(|e: ViewingError| ModelError::Invalid(e.to_string()))?,
             classifier: file.classifier.into_owned(),
             familiarity: file.familiarity.into_owned(),
             spread: file.spread,
@@ -255,7 +295,7 @@ impl Model {
             descriptor_version: descriptor.version(),
             evidence: *evidence,
             tone_mapping: *tone_mapping,
-            viewing: *viewing,
+            viewing: (*viewing).into(),
             classifier: Cow::Borrowed(classifier),
             familiarity: Cow::Borrowed(familiarity),
             spread: *spread,
@@ -392,6 +432,9 @@ impl ModelParts {
         }
         if matches!(machine, Machine::Svm(svm) if svm.gamma <= 0.0) {
             return invalid("γ is not positive");
+        }
+        if self.viewing.frames_per_second().is_some() {
+            return invalid("it was trained on films, and people have judged stills");
         }
         if self.tone_mapping.check().is_err() {
             return invalid("the tone mapping is out of range");

@@ -147,8 +147,9 @@ pub struct Params {
     pub tile: usize,
     /// How radiance is displayed.
     pub tone_mapping: ToneMapping,
-    /// On which display the picture is seen, and from how far; checked by its type. The default is what the
-    /// training data are taken to have been seen on: see [`crate::Model::viewing`].
+    /// On which display the picture is seen, and from how far, as a still or as a frame of a film
+    /// ([`Viewing::frames_per_second`]); checked by its type. The default is what the training data are taken to
+    /// have been seen on: see [`crate::Model::viewing`].
     pub viewing: Viewing,
     /// When tiles are judged.
     pub schedule: Schedule,

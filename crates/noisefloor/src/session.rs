@@ -119,8 +119,8 @@ impl<C: StoppingCriterion> Session<C> {
         let tiles = vec![tile; grid.len()];
         // Only an exposure by log-average depends on the picture, and has to wait for one
         let display = match params.tone_mapping {
-            ToneMapping::Srgb { .. } | ToneMapping::Custom { .. } => Some(params.tone_mapping.settle(&[])),
             ToneMapping::Reinhard { .. } => None,
+            known => Some(known.settle(&[])),
         };
         Ok(Self {
             watch: Watch::new(grid),

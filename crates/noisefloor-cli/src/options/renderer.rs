@@ -29,7 +29,8 @@ pub struct RendererArgs {
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<(usize, usize)>,
     /// Seed of the random numbers. The same seed gives the same image and the same stops on any number of
-    /// threads. (Other renderers may not promise this.)
+    /// threads. (Other renderers may not promise this.) Each frame of a sequence has a seed of its own, which
+    /// follows from this one and its number.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads [default: one a core].
@@ -111,7 +112,7 @@ impl RendererArgs {
         let scene = scene.map(JobPath::from);
         let scene_files = self.scene_files.check();
         let Self { seed, size, max_depth, .. } = self;
-        Ok((SourceJob { kind, scene, seed, size, max_depth, scene_files }, resources))
+        Ok((SourceJob { kind, scene, seed, same_seed: false, size, max_depth, scene_files }, resources))
     }
 
     /// Whether our own path tracer renders.

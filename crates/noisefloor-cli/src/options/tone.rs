@@ -23,7 +23,8 @@ pub struct ToneArgs {
     /// Reinhard: the smallest luminance, after exposure, that becomes white [default: none burns out].
     #[arg(long)]
     white: Option<f32>,
-    /// sRGB and LUT: factor on radiance [default: 1].
+    /// Factor on radiance [default: 1 for sRGB and LUT; for Reinhard, what brings the log-average luminance to
+    /// --key].
     #[arg(long)]
     exposure: Option<f32>,
     /// LUT: how radiance (Rec.709 primaries) is encoded before it: `linear` within the domain of the file,
@@ -57,15 +58,22 @@ impl ToneArgs {
         for (option, given, fits, wanted) in [
             ("--key", self.key.is_some(), reinhard, "reinhard"),
             ("--white", self.white.is_some(), reinhard, "reinhard"),
-            ("--exposure", self.exposure.is_some(), !reinhard, "srgb"),
             ("--lut-input", self.lut_input.is_some(), lut, "lut:FILE.cube"),
         ] {
             if given && !fits {
                 refuse!("{option} needs --tone-mapping {wanted}");
             }
         }
+        if self.key.is_some() && self.exposure.is_some() {
+            refuse!(
+                "give either --key or --exposure, not both: the exposure of Reinhard's operator follows from the key"
+            );
+        }
         let exposure = self.exposure.unwrap_or(1.0);
         Ok(match &self.tone_mapping {
+            ToneChoice::Reinhard if self.exposure.is_some() => {
+                Tone::ReinhardAt { exposure, white: self.white }
+            }
             ToneChoice::Reinhard => {
                 Tone::Reinhard { key: self.key.unwrap_or(DEFAULT_KEY), white: self.white }
             }
@@ -84,6 +92,10 @@ impl ToneArgs {
 pub enum Tone {
     Reinhard {
         key: f32,
+        white: Option<f32>,
+    },
+    ReinhardAt {
+        exposure: f32,
         white: Option<f32>,
     },
     Srgb {
@@ -107,10 +119,36 @@ impl Tone {
         Ok(tone)
     }
 
+    /// The same, of which the exposure does not hang on the picture.
+    #[must_use]
+    pub fn exposed_as(&self, exposure: f32) -> Self {
+        match *self {
+            Self::Reinhard { white, .. } => Self::ReinhardAt { exposure, white },
+            ref known => known.clone(),
+        }
+    }
+
+    /// As it is typed.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Reinhard { .. } | Self::ReinhardAt { .. } => "reinhard",
+            Self::Srgb { .. } => "srgb",
+            Self::Lut { .. } => "lut:FILE.cube",
+        }
+    }
+
+    /// Whether each picture has an exposure of its own.
+    pub fn settles(&self) -> bool {
+        matches!(self, Self::Reinhard { .. })
+    }
+
     /// The tone mapping, read and checked.
     pub fn load(&self) -> anyhow::Result<ToneMapping> {
         let tone = match self {
             Self::Reinhard { key, white } => ToneMapping::Reinhard { key: *key, white: *white },
+            Self::ReinhardAt { exposure, white } => {
+                ToneMapping::ReinhardAt { exposure: *exposure, white: *white }
+            }
             Self::Srgb { exposure } => ToneMapping::Srgb { exposure: *exposure },
             Self::Lut { file, input, exposure } => ToneMapping::Custom {
                 exposure: *exposure,

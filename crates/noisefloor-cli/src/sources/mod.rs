@@ -41,6 +41,9 @@ pub struct SourceJob {
     /// A built-in scene, or a file or folder; {frame} stands for the frame of a sequence.
     pub scene: Option<JobPath>,
     pub seed: u64,
+    /// Of a sequence: whether all frames have that seed.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub same_seed: bool,
     pub size: Option<(usize, usize)>,
     pub max_depth: Option<u32>,
     /// How the built-in renderer loads scene files.
@@ -218,10 +221,12 @@ impl SourceJob {
     }
 
     /// The source of a frame of a sequence: {frame} is filled in in the name of the scene and in values of
-    /// its parameters. All frames have the same seed.
+    /// its parameters. The frame has a seed of its own, whatever other frames there are, unless all have the same.
     #[must_use]
     pub fn of_frame(&self, frame: u32) -> Self {
-        let mut one = Self { scene: self.scene.as_ref().map(|scene| scene.of_frame(frame)), ..self.clone() };
+        let seed = if self.same_seed { self.seed } else { seed_of_frame(self.seed, frame) };
+        let scene = self.scene.as_ref().map(|scene| scene.of_frame(frame));
+        let mut one = Self { scene, seed, same_seed: false, ..self.clone() };
         for value in one.scene_files.parameters.values_mut() {
             *value = JobPath::from(&*value).of_frame(frame).to_string_lossy().into_owned();
         }
@@ -286,6 +291,17 @@ impl SourceJob {
     }
 }
 
+/// The seed of a frame. Scattered, since some renderers derive related random numbers from neighbouring seeds; of as
+/// many bits as all languages take for an integer.
+fn seed_of_frame(seed: u64, frame: u32) -> u64 {
+    let mut words = [0; 12];
+    words[..8].copy_from_slice(&seed.to_le_bytes());
+    words[8..].copy_from_slice(&frame.to_le_bytes());
+    let digest = blake3::hash(&words);
+    let first: [u8; 8] = std::array::from_fn(|i| digest.as_bytes()[i]);
+    u64::from_le_bytes(first) >> 11
+}
+
 /// A built-in scene of that name, or the scene in that file.
 fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
     if let Some(scene) = scene.to_str().and_then(scenes::by_name) {
@@ -324,4 +340,17 @@ fn edits(one: &str, other: &str) -> usize {
 fn stem(path: &OsStr) -> String {
     let stem = Path::new(path).file_stem().map(|stem| stem.to_string_lossy().into_owned());
     stem.unwrap_or_else(|| "scene".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn frames_have_seeds_of_their_own() {
+        let seeds = (1..4).flat_map(|seed| (0..5000).map(move |frame| seed_of_frame(seed, frame)));
+        let seeds: HashSet<u64> = seeds.collect();
+        assert!(seeds.len() == 15_000 && seeds.iter().all(|&seed| seed < 1 << 53));
+    }
 }

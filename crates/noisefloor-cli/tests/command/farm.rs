@@ -269,3 +269,45 @@ fn pipes_and_huge_numbers_hold_nothing_up() {
     assert!(pipe.exists() && dir.join("frame/shards/a.nfs.bad").exists());
     assert_eq!(json(&dir.join("frame/report.json"))["complete"], true);
 }
+
+/// Frames of a farm are those of `render --frames`: new noise in each, and the exposure that they are given. Whoever gives
+/// none is warned.
+#[test]
+fn a_farm_renders_the_frames_of_a_sequence() {
+    let folder = tempdir().unwrap();
+    let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/cornell-box.xml");
+    for frame in 1..=2 {
+        fs::copy(fixture, folder.path().join(format!("hall.{frame}.xml"))).unwrap();
+    }
+    let (scene, out, dir) =
+        (folder.path().join("hall.{frame}.xml"), folder.path().join("out"), folder.path().join("farm"));
+    let options = ["--size", "32x32", "--tile", "32", "--batch", "8", "--criterion", "spp:16"];
+    succeed(
+        &[&["render", "--frames", "1-2", text(&scene), "--out", text(&out), "--quiet"], &options[..]]
+            .concat(),
+    );
+    let first = out.join("0001");
+    let plan = |dir: &Path, more: &[&str]| {
+        let args = [&["farm", "plan", text(dir), "--frames", "1-2", "--", text(&scene)], &options[..], more]
+            .concat();
+        let output = command(&args).output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        stderr(&output)
+    };
+    let said = plan(&dir, &["--exposure-from", text(&first)]);
+    assert!(!said.contains("flicker"), "{said}");
+    succeed(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
+    for frame in ["0001", "0002"] {
+        assert_same(&out.join(frame), &dir.join(frame));
+        let [one, other] = [&out, &dir].map(|out| json(&out.join(frame).join("report.json")));
+        assert_eq!((&one["exposure"], &one["seed"]), (&other["exposure"], &other["seed"]));
+    }
+    assert!(
+        read_exr(dir.join("0001/image.exr")).unwrap().pixels
+            != read_exr(dir.join("0002/image.exr")).unwrap().pixels
+    );
+    let said = plan(&folder.path().join("each"), &["--same-seed"]);
+    assert!(said.contains("the film may flicker") && said.contains("one seed for all frames"), "{said}");
+    let args = ["farm", "plan", "x", "--frames", "1-2", "--", text(&scene), "--exposure-from", "first"];
+    fail(&args, &["by its output folder"]);
+}

@@ -47,12 +47,128 @@ fn a_sequence_is_rendered_and_resumed_frame_by_frame() {
     assert!(said.contains("3 frames, 8 to 8 samples per pixel"), "{said}");
     assert_eq!(table(&out), [(1, true, 8.0), (2, true, 8.0), (3, true, 8.0)]);
     assert_eq!(fs::metadata(out.join("0001/image.exr")).unwrap().modified().unwrap(), first);
-    let seeds: Vec<_> =
-        (1..=3).map(|frame| json(&out.join(format!("{frame:04}/report.json")))["seed"].clone()).collect();
-    assert!(seeds.iter().all(|seed| *seed == seeds[0]), "{seeds:?}");
-    // The frames are of one still scene and one seed
-    let picture = |frame: u32| fs::read(out.join(format!("{frame:04}/image.png"))).unwrap();
-    assert!(picture(1) == picture(2) && picture(2) == picture(3));
+    // The frames are of one still scene: they differ by their noise, and not by their exposure
+    let [seeds, exposures] = ["seed", "exposure"].map(|key| reported(&out, key));
+    assert!(seeds[0] != seeds[1] && seeds[1] != seeds[2] && seeds[2] != seeds[0], "{seeds:?}");
+    assert!(exposures[0].is_number() && exposures.iter().all(|e| *e == exposures[0]), "{exposures:?}");
+    assert!(picture(&out, 1) != picture(&out, 2) && picture(&out, 2) != picture(&out, 3));
+    // As without the interruption
+    let again = folder.path().join("again");
+    succeed(&[
+        "render",
+        "--config",
+        text(&shot),
+        "--frames",
+        "1-3",
+        text(&scene),
+        "--out",
+        text(&again),
+        "--quiet",
+    ]);
+    assert!((1..=3).all(|frame| picture(&out, frame) == picture(&again, frame)));
+}
+
+/// What the reports of three frames say.
+fn reported(out: &Path, key: &str) -> Vec<serde_json::Value> {
+    (1..=3).map(|frame| json(&out.join(format!("{frame:04}/report.json")))[key].clone()).collect()
+}
+
+fn picture(out: &Path, frame: u32) -> Vec<u8> {
+    fs::read(out.join(format!("{frame:04}/image.exr"))).unwrap()
+}
+
+/// A film has one exposure: of the frame that is named, of another render, or a number; or each its own, which is
+/// warned of.
+#[test]
+fn frames_take_their_exposure_from_where_they_are_told() {
+    let folder = shots();
+    let shot = folder.path().join("shot.toml");
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let out = |name: &str| folder.path().join(name);
+    let render = |name: &str, more: &[&str]| {
+        let out = out(name);
+        let args = ["render", "--config", text(&shot), "--frames", "1-3", text(&scene), "--out", text(&out)];
+        let output = command(&[&args[..], more].concat()).output().unwrap();
+        (output.status.code(), stderr(&output), out)
+    };
+    let exposures = |name: &str, more: &[&str]| {
+        let (code, said, out) = render(name, more);
+        assert_eq!(code, Some(0), "{said}");
+        (reported(&out, "exposure"), said)
+    };
+    let (each, said) = exposures("each", &["--exposure-from", "each"]);
+    assert!(each[0] != each[1] && each[1] != each[2], "{each:?}");
+    assert!(said.contains("the film flickers"), "{said}");
+    let (first, said) = exposures("first", &[]);
+    assert_eq!(first, vec![each[0].clone(); 3]);
+    assert!(!said.contains("warning"), "{said}");
+    // Frame 3 is rendered first
+    let (third, _) = exposures("third", &["--exposure-from", "3"]);
+    assert_eq!(third, vec![each[2].clone(); 3]);
+    let second = out("each/0002");
+    let (other, _) = exposures("other", &["--exposure-from", text(&second)]);
+    assert_eq!(other, vec![each[1].clone(); 3]);
+    let (number, _) = exposures("number", &["--exposure", "1.25"]);
+    assert_eq!(number, vec![serde_json::json!(1.25); 3]);
+
+    // What is there keeps its exposure, whatever is asked for later
+    let (code, said, _) = render("third", &["--resume", "--exposure-from", "1"]);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("exposure.json has the exposure of frame 3"), "{said}");
+    fs::remove_dir_all(out("third/0002")).unwrap();
+    assert_eq!(exposures("third", &["--resume"]).0, third);
+    let (anew, _) = exposures("third", &["--force"]);
+    assert_eq!(anew, first);
+
+    let (code, said, _) = render("wrong", &["--exposure-from", "nowhere"]);
+    assert_eq!(code, Some(1));
+    assert!(said.contains("--exposure-from nowhere"), "{said}");
+    let srgb = ["--exposure-from", "first", "--tone-mapping", "srgb"];
+    fail(&[&["render", "--frames", "1-3", text(&scene)], &srgb[..]].concat(), &["--tone-mapping srgb"]);
+    fail(&["render", "--exposure-from", "first"], &["--frames"]);
+    fail(&["render", "--exposure", "2", "--key", "0.2"], &["either --key or --exposure"]);
+}
+
+/// One seed for all frames is possible, and is warned of; a film is not judged so.
+#[test]
+fn one_seed_for_all_frames_is_warned_of() {
+    let folder = shots();
+    let (out, shot) = (folder.path().join("out"), folder.path().join("shot.toml"));
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let render = ["render", "--config", text(&shot), "--frames", "1-3", text(&scene), "--out", text(&out)];
+    let output = command(&[&render[..], &["--same-seed"]].concat()).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(stderr(&output).matches("about three times the samples").count(), 1, "{}", stderr(&output));
+    assert!(reported(&out, "seed").iter().all(|seed| *seed == 1));
+    let shown = |frame: u32| fs::read(out.join(format!("{frame:04}/image.png"))).unwrap();
+    assert!(shown(1) == shown(2) && shown(2) == shown(3));
+    fail(&[&render[..], &["--same-seed", "--fps", "24"]].concat(), &["--same-seed", "--fps"]);
+    let viewing = ["--same-seed", "--viewing", "desk,fps=24"];
+    fail(&[&render[..], &viewing].concat(), &["leave out --same-seed"]);
+}
+
+/// Eyes average over noise that is new in every frame: a film needs fewer samples, and fewer at more frames a second.
+#[test]
+fn frames_of_a_film_need_fewer_samples() {
+    let folder = tempdir().unwrap();
+    let render = |more: &[&str], name: &str| {
+        let out = folder.path().join(name);
+        let args = ["render", "--size", "64x64", "--tile", "32", "--max-spp", "4000", "--out", text(&out)];
+        let said = succeed(&[&args[..], more].concat());
+        let report = json(&out.join("report.json"));
+        (report["samples"].as_u64().unwrap(), report["judged_for_fps"].clone(), said)
+    };
+    let (still, none, said) = render(&[], "still");
+    assert!(none.is_null() && !said.contains("frames a second"), "{said}");
+    let (slow, rate, said) = render(&["--fps", "24"], "slow");
+    assert_eq!(rate, 24.0);
+    assert!(said.contains("judged for 24 frames a second") && said.contains("come from stills"), "{said}");
+    let (fast, rate, _) = render(&["--viewing", "desk,fps=60"], "fast");
+    assert_eq!(rate, 60.0);
+    println!("{still} samples of a still, {slow} at 24 frames a second, {fast} at 60");
+    assert!(fast < slow && slow < still, "{still}, {slow}, {fast}");
+    fail(&["render", "--fps", "4"], &["10…1000 frames per second"]);
+    fail(&["render", "--fps", "24", "--viewing", "desk,fps=25"], &["either --fps"]);
 }
 
 /// A finished frame is this sequence's only if its job is, and if its pictures are there.
@@ -113,6 +229,49 @@ fn a_killed_sequence_leaves_no_frame_rendering() {
     parent.wait().unwrap();
     wait("the frame ends", &|| !locked());
     assert!(checkpoint.exists(), "it has written what it had");
+}
+
+/// Killed in the frame whose exposure all have, and resumed, a sequence has the pictures, stops and exposure of one that
+/// was not.
+#[test]
+#[cfg(unix)]
+fn a_killed_sequence_is_resumed_as_if_it_had_not_been() {
+    let folder = shots();
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let options = ["--size", "64x64", "--tile", "32", "--batch", "16", "--max-spp", "4000", "--threads", "1"];
+    let render = |out: &Path, more: &[&str]| {
+        let args = ["render", "--frames", "1-2", text(&scene), "--out", text(out), "--quiet"];
+        command(&[&args[..], &options, more].concat())
+    };
+    let (whole, out) = (folder.path().join("whole"), folder.path().join("out"));
+    assert!(render(&whole, &[]).status().unwrap().success());
+    let mut killed = render(&out, &[]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let lock = out.join("0001/.noisefloor.lock");
+    let locked = || fs::File::open(&lock).is_ok_and(|lock| lock.try_lock().is_err());
+    let began = std::time::Instant::now();
+    while !locked() {
+        assert!(began.elapsed().as_secs() < 60, "the first frame begins");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    while locked() {
+        assert!(began.elapsed().as_secs() < 120, "the first frame ends");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(!out.join("exposure.json").exists(), "it was killed before its exposure was known");
+    assert!(render(&out, &["--resume"]).status().unwrap().success());
+    for frame in 1..=2 {
+        let read = |out: &Path, name: &str| fs::read(out.join(format!("{frame:04}/{name}"))).unwrap();
+        assert!(
+            ["image.exr", "stops.csv"].iter().all(|name| read(&whole, name) == read(&out, name)),
+            "{frame}"
+        );
+        let exposure = |out: &Path| json(&out.join(format!("{frame:04}/report.json")))["exposure"].clone();
+        assert_eq!(exposure(&whole), exposure(&out));
+    }
+    let kept = |out: &Path| json(&out.join("exposure.json"));
+    assert_eq!(kept(&whole), kept(&out));
 }
 
 #[test]

@@ -18,8 +18,8 @@ class Frame:
     """engine: Cycles' RenderEngine, which Blender has asked for a layer. cycles: renders what the evaluated
     scene says. shown: how the picture is displayed, see display.py.
 
-    Only the evaluated scene and the engine's own copy of the render settings are changed. They are gone
-    after the frame, and no file, undo step or window ever sees them."""
+    Only the evaluated scene and the engine's own copy of the render settings are changed, and changed back
+    after the layer. No file, undo step or window ever sees them."""
 
     def __init__(self, engine, depsgraph, cycles, shown):
         self.engine, self.cycles, self.depsgraph = engine, cycles, depsgraph
@@ -40,8 +40,11 @@ class Frame:
         self.seed = (
             f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
         )
+        self.film = self._film()
         self.session = noisefloor.Session(
-            *self.size, settings.oracle(self.settings), settings.params(self.scene, sampling.BATCH, shown)
+            *self.size,
+            settings.oracle(self.settings),
+            settings.params(self.scene, sampling.BATCH, shown, self.film),
         )
         self.sums = passes.Sums(*self.size)
         self.begun, self.sampled = time.monotonic(), 0
@@ -49,6 +52,23 @@ class Frame:
         # What the windows draw meanwhile, and how often it has changed
         self.shown, self.shows = numpy.zeros((*self.size[::-1], 4), numpy.float32), 0
         self.denoiser = self._denoiser(depsgraph) if self.scene.cycles.use_denoising else None
+
+    def _film(self):
+        """The frames per second of the animation that is rendered, whose noise is new in every frame; None for a
+        still."""
+        if not self.engine.is_animation:
+            return None
+        if not self.scene.cycles.use_animated_seed:
+            self.engine.report(
+                {"WARNING"},
+                "All frames have the same seed: their noise stands still on the screen, and takes about three times "
+                "the samples to vanish. Use Animated Seed (the clock beside Seed), so that noisefloor judges them as a film",
+            )
+            return None
+        render = self.scene.render
+        rate = render.fps / render.fps_base
+        # What is slower is a row of stills
+        return rate if rate >= 10 else None
 
     def _denoiser(self, depsgraph):
         """The library that denoises the picture; Cycles is told to render what it needs."""
@@ -68,7 +88,7 @@ class Frame:
 
     def run(self, report):
         """Renders until every tile is done; calls report(frame) after each batch."""
-        render = self.engine.render
+        render, cycles = self.engine.render, self.scene.cycles
         border = [
             "use_border",
             "use_crop_to_border",
@@ -77,15 +97,19 @@ class Frame:
             "border_min_y",
             "border_max_y",
         ]
-        before = {name: getattr(render, name) for name in border}
+        # The evaluated scene is the same in the next frame of an animation, and in the next layer
+        every = [prop.identifier for prop in cycles.bl_rna.properties if not prop.is_readonly]
+        owned = [(render, name) for name in border] + [(cycles, name) for name in every]
+        before = [(owner, name, getattr(owner, name)) for owner, name in owned]
         try:
             while not self.session.done:
                 ended = self._round(report)
                 if ended:
                     self.session.close_all(ended)
         finally:
-            for name, value in before.items():
-                setattr(render, name, value)
+            for owner, name, value in before:
+                if getattr(owner, name) != value:
+                    setattr(owner, name, value)
 
     def _round(self, report):
         """A batch of samples for each open tile, and verdicts on those that are due; returns why to end, if
@@ -191,7 +215,8 @@ class Frame:
             if stop.reason != "converged":
                 reasons[stop.reason] = reasons.get(stop.reason, 0) + 1
         others = "".join(f"; {count} ended: {reason}" for reason, count in reasons.items())
-        seen = f"{self.settings.people:.0%} of people, {self.settings.viewing}"
+        film = f", {self.film:g} frames a second" if self.film else ""
+        seen = f"{self.settings.people:.0%} of people, {self.settings.viewing}{film}"
         return (
             f"{done} of {len(stops)} tiles without visible noise ({seen}), "
             f"{spp.min()} to {spp.max()} samples per pixel, {spp.mean():.0f} on average{others}; "

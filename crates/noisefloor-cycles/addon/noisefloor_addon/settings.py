@@ -67,21 +67,24 @@ def oracle(settings):
     return noisefloor.Oracle(settings.people)
 
 
-def people(scene):
-    """Who looks, and where."""
-    settings = scene.noisefloor
-    if settings.viewing != "mine":
-        return {"viewing": settings.viewing}
-    eyes = noisefloor.eyes()
-    if eyes is None:
-        raise ValueError(
-            "your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen"
-        )
-    return {"viewing": eyes.viewing, "audience": eyes.audience}
+def people(scene, film=None):
+    """Who looks, and where; film: frames per second, or None for a still."""
+    settings, found = scene.noisefloor, {"viewing": scene.noisefloor.viewing}
+    if settings.viewing == "mine":
+        eyes = noisefloor.eyes()
+        if eyes is None:
+            raise ValueError(
+                "your eyes are unknown: run `noisefloor calibrate`, or choose where the picture is seen"
+            )
+        found = {"viewing": eyes.viewing, "audience": eyes.audience}
+    if film:
+        found["viewing"] = f"{found['viewing']},fps={film:.6g}"
+    return found
 
 
-def params(scene, batch, shown):
-    """How tiles are judged; shown: as display.table() says. Verdicts come after whole batches."""
+def params(scene, batch, shown, film=None):
+    """How tiles are judged; shown: as display.table() says; film: frames per second, or None for a still. Verdicts come
+    after whole batches."""
     settings = scene.noisefloor
     most = max(settings.max_samples // batch, 2) * batch
     return noisefloor.Params(
@@ -90,7 +93,7 @@ def params(scene, batch, shown):
         min_spp=min(-(-settings.min_samples // batch) * batch, most),
         max_spp=most,
         tone_mapping=shown,
-        **people(scene),
+        **people(scene, film),
     )
 
 

@@ -43,6 +43,8 @@ class Viewing:
     def black(self) -> float: ...
     @property
     def ambient(self) -> float: ...
+    @property
+    def frames_per_second(self) -> float | None: ...
     def __eq__(self, value: object, /) -> bool: ...
     def __ne__(self, value: object, /) -> bool: ...
 
@@ -71,7 +73,7 @@ class Params:
         tone_mapping: _ToneMapping | None = None,
         key: float = 0.18,
         white: float | None = None,
-        exposure: float = 1.0,
+        exposure: float | None = None,
         viewing: Viewing | str | None = None,
         schedule: Literal["every", "spaced", "growing"] = "spaced",
         step: int = 8,
@@ -308,7 +310,7 @@ def metrics(
     tone_mapping: _ToneMapping | None = None,
     key: float = 0.18,
     white: float | None = None,
-    exposure: float = 1.0,
+    exposure: float | None = None,
     viewing: Viewing | str | None = None,
     encoding: _Encoding = "linear",
 ) -> Metrics: ...

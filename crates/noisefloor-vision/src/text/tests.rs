@@ -127,10 +127,11 @@ proptest! {
             (1.0f64..4.0).prop_map(Eotf::Gamma),
         ],
         primaries in primaries(),
+        frames_per_second in proptest::option::of(10.0f64..1000.0),
     ) {
         let params = ViewingParams {
             pixels_per_degree: ppd, peak, black: black * peak, ambient, reflectivity: share, eotf,
-            primaries,
+            primaries, frames_per_second,
         };
         let viewing = params.check().unwrap();
         prop_assert_eq!(viewing.to_string().parse(), Ok(viewing));
@@ -148,6 +149,12 @@ fn serde_refuses_what_check_refuses() {
         "ppd=60,peak=300,black=0.5,ambient=100,eotf=gamma2.25,primaries=rec2020".parse().unwrap();
     let json = serde_json::to_string(&hdr).unwrap();
     assert_eq!(serde_json::from_str::<Viewing>(&json).unwrap(), hdr);
+    let film = hdr.with_frames_per_second(Some(23.976)).unwrap();
+    assert!(film.to_string().ends_with(",fps=23.976"), "{film}");
+    let told = serde_json::to_string(&film).unwrap();
+    assert_eq!(serde_json::from_str::<Viewing>(&told).unwrap(), film);
+    // A still is written as before there were films
+    assert_eq!(told, format!("{},\"frames_per_second\":23.976}}", json.strip_suffix('}').unwrap()));
     let proof: Viewing = "desk,primaries=p3,white=d50".parse().unwrap();
     let mut json = serde_json::to_value(proof).unwrap();
     assert_eq!(serde_json::from_value::<Viewing>(json.clone()).unwrap(), proof);

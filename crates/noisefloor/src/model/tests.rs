@@ -56,6 +56,13 @@ fn files_keep_measured_colours_of_a_display() {
     assert_eq!(Model::read(&bytes[..]).unwrap().viewing(), viewing);
 }
 
+/// Nobody has said when they stop seeing noise in a film: thresholds are those of stills.
+#[test]
+fn models_are_of_stills() {
+    let film = changed(small(), |m| m.viewing = "desk,fps=24".parse().unwrap());
+    assert!(matches!(film, Err(ModelError::Invalid(why)) if why.contains("films")));
+}
+
 #[cfg(feature = "bundled-model")]
 #[test]
 fn the_bundled_model_is_whole_small_and_scored() {

@@ -91,6 +91,15 @@ fn absolute(dir: &Path) -> anyhow::Result<PathBuf> {
 fn plan(PlanTask { dir, frames, tasks, keep, render }: PlanTask) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
     if let Some(render) = render {
+        if frames.is_some() && render.job.tone.settles() {
+            note!(
+                "warning: each frame settles an exposure of its own, and the film may flicker: render one of them first, \
+                 and give its output folder as --exposure-from, or a number as --exposure"
+            );
+        }
+        if frames.is_some() && render.job.source.same_seed {
+            note!("warning: {}", crate::render::ONE_SEED);
+        }
         let plan = FarmPlan::new(render, frames, tasks, keep);
         Farm::plan(&here, &absolute(&dir)?, plan)?;
     }

@@ -101,6 +101,7 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
             ToneMapping::Reinhard { key, white: None } => format!("Reinhard, key {key}"),
             ToneMapping::Reinhard { key, white: Some(white) } =>
                 format!("Reinhard, key {key}, white {white}"),
+            ToneMapping::ReinhardAt { exposure, .. } => format!("Reinhard, exposure {exposure}"),
         }
     )?;
     // Logistic regression is kept as two support vectors of a kernel too wide to bend

@@ -22,6 +22,9 @@ pub struct RenderJob {
     pub tone: Tone,
     /// By default where the model was trained.
     pub viewing: Option<Viewing>,
+    /// Of a film that the picture is a frame of, if the viewing conditions do not say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames_per_second: Option<f64>,
     pub limits: Limits,
 }
 
@@ -90,10 +93,15 @@ impl RenderJob {
             }
             _ => None,
         };
-        let viewing = match &oracle {
-            Some(oracle) => judged_by(self.viewing, oracle)?,
-            None => self.viewing.unwrap_or_default(),
+        let still =
+            self.viewing.or(oracle.as_ref().map(|oracle| oracle.model().viewing())).unwrap_or_default();
+        let viewing = match self.frames_per_second {
+            Some(rate) => still.with_frames_per_second(Some(rate))?,
+            None => still,
         };
+        if let Some(oracle) = &oracle {
+            judged_by(Some(viewing), oracle)?;
+        }
         let displayed = Params::default().with_viewing(viewing).with_tone_mapping(self.tone.load()?);
         let params = self.limits.params(displayed);
         params.check()?;

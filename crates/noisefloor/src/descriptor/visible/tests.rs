@@ -35,6 +35,19 @@ fn noise_is_as_strong_as_its_contrast() {
     }
 }
 
+/// New in every frame, noise is averaged over, and more so at more frames a second. As a still it counts by 0.578 of what
+/// a film does, in differences, which is 0.785 in contrast: what is left of fine noise is less than that.
+#[test]
+fn noise_of_a_film_is_weaker() {
+    let planes = tile(0.5, 0.008);
+    let [still, slow, fast] =
+        ["desk", "desk,fps=24", "desk,fps=60"].map(|viewing| own(&on(viewing, &planes)));
+    let strength = |own: &[f32]| amplitude(own[0]) / amplitude(still[0]);
+    assert!((0.6..0.95).contains(&strength(&slow)), "{}", strength(&slow));
+    assert!((0.4..0.7).contains(&strength(&fast)), "{}", strength(&fast));
+    assert_eq!([&slow[1..], &fast[1..]], [&still[1..]; 2]);
+}
+
 /// Of two halves of a tile, one without noise, the windows in the noisy one count, however large the other is; and a
 /// window on the border of two tiles is seen by both.
 #[test]

@@ -86,7 +86,8 @@ struct PlanArgs {
     /// Folder of the farm, on a file system that all machines share.
     dir: PathBuf,
     /// First and last frame. {frame} in the name of the scene, or {frame:04} for four digits, is the number
-    /// of the frame. All frames have the same seed.
+    /// of the frame. Each frame has a seed of its own. Give all one exposure: --exposure-from the output folder
+    /// of one that was rendered before, or --exposure.
     #[arg(long, value_name = "A-B")]
     frames: Option<FrameRange>,
     /// Most tasks of a round over all frames, up to 1000; short rounds have fewer.

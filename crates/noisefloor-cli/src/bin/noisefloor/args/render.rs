@@ -2,9 +2,9 @@
 
 use super::verdicts::{CriterionChoice, Preset, VerdictArgs};
 use crate::job::{Autosave, CriterionJob, RenderJob, RenderRun, WatchPage};
-use crate::render::{SequenceRun, TEV_ADDRESS};
+use crate::render::{SequenceExposure, SequenceRun, TEV_ADDRESS, exposure_of};
 use clap::{Args, Command};
-use noisefloor::Audience;
+use noisefloor::{Audience, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::denoiser::DenoiserChoice;
 use noisefloor_cli::options::eyes::EyesArgs;
@@ -15,12 +15,15 @@ use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
 use noisefloor_cli::refuse;
 use noisefloor_cli::say::note;
+use noisefloor_cli::sources::SourceJob;
 use noisefloor_cli::spell::JobPath;
 use noisefloor_eyes::Person;
 use noisefloor_farm::FrameRange;
+use std::convert::Infallible;
 use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Duration;
 
 /// Render a scene, and stop each tile when nobody sees noise in it any more.
@@ -50,7 +53,7 @@ use std::time::Duration;
   noisefloor render --denoise oidn                   for a picture that will be denoised (fewer samples)
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
   noisefloor render --time 60 --resume               another minute of the render in the output folder
-  noisefloor render --frames 1-240 'shots/hall.{frame:04}.xml'   a sequence, into out/hall/0001 and so on
+  noisefloor render --frames 1-240 --fps 24 'shots/hall.{frame:04}.xml'   a film, into out/hall/0001 and so on
   noisefloor render --config shot.toml --preset draft     options from a file; a quick look
   noisefloor render --watch                          the picture so far, in a browser
   noisefloor render --force                          once more, over the render in the output folder")]
@@ -89,10 +92,14 @@ pub struct RenderArgs {
     quiet: bool,
     /// Render a sequence: SCENE holds {frame}, or {frame:04} for four digits, in place of the number; so
     /// may --against and values of --define. Each frame goes into a folder of its own, and frames.csv sums
-    /// up. --resume goes on where the sequence was interrupted. All frames have the same seed: noise then
-    /// stays where it is on the screen.
+    /// up. --resume goes on where the sequence was interrupted. Each frame has a seed of its own, and all have
+    /// one exposure (--exposure-from). With --fps, they are judged as frames of a film.
     #[arg(long, value_name = "FIRST-LAST")]
     frames: Option<FrameRange>,
+    /// Give all frames the same seed. Their noise then stands still on the screen, like dirt on the lens, and
+    /// takes about three times the samples to vanish.
+    #[arg(long, conflicts_with = "fps")]
+    same_seed: bool,
     /// Options from a file, as max-spp = 2000 or denoise = "oidn", a line each. What is typed as well wins.
     #[arg(long, value_name = "FILE.toml")]
     config: Option<PathBuf>,
@@ -110,8 +117,17 @@ pub struct RenderArgs {
     verdicts: VerdictArgs,
     #[command(flatten, next_help_heading = "What people see")]
     tone: ToneArgs,
+    /// Where Reinhard's operator takes its exposure from, so that a film does not flicker: `first`, the first
+    /// frame that is rendered; the number of another one; the output folder of another render; or `each`, from
+    /// every frame by itself [default: first]. --exposure gives it as a number.
+    #[arg(long, value_name = "WHERE", help_heading = "What people see", conflicts_with = "exposure")]
+    exposure_from: Option<ExposureFrom>,
     #[command(flatten, next_help_heading = "What people see")]
     viewing: ViewingArgs,
+    /// Judge as a frame of a film of so many frames per second, each with new noise: people's eyes average over
+    /// it. By the vision model; nobody has been asked about films.
+    #[arg(long, value_name = "RATE", value_parser = rate, help_heading = "What people see")]
+    fps: Option<f64>,
     #[command(flatten, next_help_heading = "What people see")]
     eyes: EyesArgs,
     #[command(flatten, next_help_heading = "To look on")]
@@ -167,6 +183,34 @@ struct LookArgs {
 /// the noise.
 const DRAFT_LOST: f64 = 0.9;
 
+/// Where the exposure of a sequence comes from.
+#[derive(Clone, Debug, PartialEq)]
+enum ExposureFrom {
+    First,
+    Frame(u32),
+    Render(PathBuf),
+    Each,
+}
+
+impl FromStr for ExposureFrom {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match (text, text.parse()) {
+            ("first", _) => Self::First,
+            ("each", _) => Self::Each,
+            (_, Ok(frame)) => Self::Frame(frame),
+            _ => Self::Render(text.into()),
+        })
+    }
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().map_err(|_| "expected frames per second, such as 24".to_owned())?;
+    Viewing::default().with_frames_per_second(Some(rate)).map_err(|error| error.to_string())?;
+    Ok(rate)
+}
+
 /// As seconds, or 0 for never.
 fn autosave(text: &str) -> Result<Autosave, String> {
     if text.parse() == Ok(0.0) { Ok(Autosave::Never) } else { values::seconds(text).map(Autosave::Every) }
@@ -216,11 +260,32 @@ impl RenderArgs {
             note!("a denoised picture takes less than half of the time in most scenes: add --denoise oidn");
         }
         let (source, resources) = self.renderer.check(self.scene.as_deref())?;
+        let source = SourceJob { same_seed: self.same_seed, ..source };
         let viewing = self.viewing.typed().or_else(|| eyes.map(|person| person.viewing()));
-        let tone = self.tone.check()?;
+        let in_film = viewing.and_then(|viewing| viewing.frames_per_second());
+        if in_film.is_some() && self.fps.is_some() {
+            refuse!("give either --fps or the fps of --viewing, not both");
+        }
+        if in_film.is_some() && self.same_seed {
+            refuse!(
+                "a film is judged as one whose noise is new in every frame: leave out --same-seed, or fps"
+            );
+        }
+        let mut tone = self.tone.check()?;
+        if self.exposure_from.is_some() && !tone.settles() {
+            refuse!("--exposure-from: --tone-mapping {} has the exposure of --exposure", tone.name());
+        }
+        match &self.exposure_from {
+            Some(ExposureFrom::Render(render)) => tone = tone.exposed_as(exposure_of(render)?),
+            Some(ExposureFrom::First | ExposureFrom::Frame(_)) if self.frames.is_none() => refuse!(
+                "--exposure-from: frames need --frames; a single render, or a farm, takes the exposure of another \
+                 render, by its output folder"
+            ),
+            _ => {}
+        }
         let hosts = self.look.allow_host;
         Ok(RenderRun {
-            job: RenderJob { source, criterion, tone, viewing, limits },
+            job: RenderJob { source, criterion, tone, viewing, frames_per_second: self.fps, limits },
             resources,
             out: self.out.map(JobPath),
             time: self.time,
@@ -241,10 +306,17 @@ impl RenderArgs {
     /// Frames that can begin.
     pub fn check_frames(self) -> anyhow::Result<SequenceRun> {
         let Some(frames) = self.frames else { refuse!("--frames is missing") };
+        let from = self.exposure_from.clone().unwrap_or(ExposureFrom::First);
+        let typed = self.exposure_from.is_some();
         let run = self.check()?;
+        let exposure = match from {
+            ExposureFrom::First if run.job.tone.settles() => SequenceExposure::Of(frames.first(), typed),
+            ExposureFrom::Frame(frame) if run.job.tone.settles() => SequenceExposure::Of(frame, typed),
+            _ => SequenceExposure::Each,
+        };
         let before = run.job.source.check_frames()?;
         let out = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(stem(&before)), PathBuf::from);
-        Ok(SequenceRun { frames, out, run })
+        Ok(SequenceRun { frames, out, run, exposure })
     }
 }
 

@@ -28,6 +28,9 @@ pub(super) struct Report<'a> {
     params: &'a Params,
     /// Display exposure that was settled.
     exposure: Option<f32>,
+    /// Of the film that it was judged for as a frame, in frames per second; null for a still. Thresholds of people
+    /// come from stills in either case.
+    judged_for_fps: Option<f64>,
     /// Whether every tile has what it should have: false for a render that was interrupted or ran out of
     /// time, and while it runs.
     complete: bool,
@@ -101,6 +104,7 @@ impl<'a> Report<'a> {
             render: &output.job,
             params: session.params(),
             exposure: session.display().map(noisefloor::display::Display::exposure),
+            judged_for_fps: session.params().viewing.frames_per_second(),
             complete: clock.is_some() && tiles.iter().all(TileState::is_final),
             tiles: tiles.len(),
             stops,

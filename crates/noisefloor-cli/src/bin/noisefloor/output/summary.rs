@@ -62,6 +62,11 @@ impl Output {
             let more = if offset == 0.0 { String::new() } else { format!(" {offset:+}") };
             say!("tiles stop at {slope:.2} times the samples that the model's observers need{more}")?;
         }
+        if let Some(rate) = session.params().viewing.frames_per_second().filter(|_| !counts) {
+            say!(
+                "judged for {rate} frames a second, by the vision model; people's thresholds come from stills"
+            )?;
+        }
         if let Some(threshold) = typical_threshold(session) {
             say!(
                 "in the typical tile, people stop seeing noise between {} and {} samples per pixel (80 % of them)",

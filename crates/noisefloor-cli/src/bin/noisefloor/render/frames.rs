@@ -2,9 +2,10 @@
 //!
 //! A frame that fails or is killed takes nothing else with it, and memory is that of one frame.
 
-use crate::job::RenderRun;
-use anyhow::Context;
+use crate::job::{CriterionJob, RenderRun};
+use anyhow::{Context, bail};
 use indicatif::HumanDuration;
+use noisefloor_cli::files::write_json;
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::signals::{self, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::{note, say};
@@ -12,7 +13,7 @@ use noisefloor_farm::FrameRange;
 use noisefloor_image::write_csv;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
-use std::io::{BufReader, Write};
+use std::io::{BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -24,14 +25,70 @@ pub struct SequenceRun {
     pub frames: FrameRange,
     pub out: PathBuf,
     pub run: RenderRun,
+    pub exposure: SequenceExposure,
+}
+
+/// What exposure frames have, where it hangs on the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SequenceExposure {
+    /// Each what it settles on, or all a given one.
+    Each,
+    /// All that of one frame; whether the user has named it.
+    Of(u32, bool),
+}
+
+/// exposure.json: what a sequence keeps, so that frames which are rendered later, or elsewhere, have the same.
+#[derive(Serialize, Deserialize)]
+struct KeptExposure {
+    /// Whose it is.
+    frame: u32,
+    exposure: f32,
+}
+
+const KEPT: &str = "exposure.json";
+
+impl SequenceRun {
+    /// The run of one frame, in a folder of its own; with a given exposure, unless it is the one whose exposure all have.
+    fn of_frame(&self, frame: u32, given: Option<&KeptExposure>) -> RenderRun {
+        let out = self.out.join(FrameRange::folder(frame));
+        let against = self.run.against.as_ref().map(|against| against.of_frame(frame));
+        let mut job = self.run.job.of_frame(frame);
+        if let Some(kept) = given.filter(|kept| kept.frame != frame) {
+            job.tone = job.tone.exposed_as(kept.exposure);
+        }
+        RenderRun { job, out: Some(out.into()), against, ..self.run.clone() }
+    }
 }
 
 impl SequenceRun {
-    /// The run of one frame, in a folder of its own.
-    fn of_frame(&self, frame: u32) -> RenderRun {
-        let out = self.out.join(FrameRange::folder(frame));
-        let against = self.run.against.as_ref().map(|against| against.of_frame(frame));
-        RenderRun { job: self.run.job.of_frame(frame), out: Some(out.into()), against, ..self.run.clone() }
+    /// The exposure that frames in the output folder have already.
+    fn kept_exposure(&self) -> anyhow::Result<Option<KeptExposure>> {
+        let path = self.out.join(KEPT);
+        let SequenceExposure::Of(frame, typed) = self.exposure else { return Ok(None) };
+        if self.run.earlier == Earlier::Overwrite {
+            return match fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => {
+                    Err(error).context(path.display().to_string())
+                }
+                _ => Ok(None),
+            };
+        }
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(error).context(path.display().to_string()),
+        };
+        let kept: KeptExposure =
+            serde_json::from_reader(BufReader::new(file)).with_context(|| path.display().to_string())?;
+        if typed && kept.frame != frame {
+            bail!(
+                "{} has the exposure of frame {}, which the frames that are there have: leave out --exposure-from, or \
+                 render all frames again with --force",
+                path.display(),
+                kept.frame
+            );
+        }
+        Ok(Some(kept))
     }
 }
 
@@ -69,34 +126,72 @@ struct FrameReport {
     unfamiliar_tiles: usize,
     seconds_before: f64,
     seconds_total: Option<f64>,
+    exposure: Option<f32>,
+}
+
+/// The exposure of the render in this folder.
+pub fn exposure_of(folder: &Path) -> anyhow::Result<f32> {
+    let said = || format!("--exposure-from {}", folder.display());
+    let report =
+        read(folder).with_context(said).context("no report.json of a render is there, or it is damaged")?;
+    report
+        .exposure
+        .with_context(said)
+        .context("that render has no exposure yet: let it come to its first verdict")
 }
 
 pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
-    let SequenceRun { frames, out, run } = sequence;
+    let SequenceRun { frames, out, run, exposure } = sequence;
     let (first, last) = (frames.first(), frames.last());
     fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     // Ctrl-C reaches the process of the frame, too, which then writes what there is
     let cancel = Arc::new(AtomicBool::new(false));
     cancel_on_signal(Arc::clone(&cancel), "stopping after this frame")?;
+    warn(sequence);
     let (began, mut rows, mut rendered) = (Instant::now(), Vec::new(), 0);
-    for frame in frames.iter() {
+    let mut given = sequence.kept_exposure()?;
+    // The frame whose exposure all have comes first
+    let reference = match *exposure {
+        SequenceExposure::Of(frame, _) if given.is_none() => Some(frame),
+        _ => None,
+    };
+    let others = frames.iter().filter(|frame| Some(*frame) != reference);
+    for frame in reference.into_iter().chain(others) {
         let folder = out.join(FrameRange::folder(frame));
         // Whether that is this frame, its own process knows: it reads the scene
         let done = run.earlier == Earlier::Resume && read(&folder).is_some_and(|report| report.complete);
-        let status = elsewhere(&sequence.of_frame(frame)).with_context(|| format!("frame {frame}"))?;
+        let status =
+            elsewhere(&sequence.of_frame(frame, given.as_ref())).with_context(|| format!("frame {frame}"))?;
         rendered += u32::from(!done);
         if !status.success() && status.code() != Some(INTERRUPTED.into()) {
             note!("frame {frame} of {first} to {last} failed; --resume goes on from it");
             return Ok(ExitCode::from(status.code().and_then(|code| code.try_into().ok()).unwrap_or(1)));
         }
-        rows.extend(read(&folder).map(|report| row(frame, &report)));
-        write_csv(out.join("frames.csv"), &rows)?;
+        let report = read(&folder);
+        if frames.iter().any(|one| one == frame) {
+            rows.extend(report.as_ref().map(|report| row(frame, report)));
+            rows.sort_by_key(|row| row.frame);
+            write_csv(out.join("frames.csv"), &rows)?;
+        }
         if cancel.load(Ordering::Relaxed) {
             note!("stopped at frame {frame} of {first} to {last}; --resume goes on from it");
             return Ok(ExitCode::from(INTERRUPTED));
         }
-        if !run.quiet && !done && frame < last {
-            let left = began.elapsed().as_secs_f64() / f64::from(rendered) * f64::from(last - frame);
+        if Some(frame) == reference {
+            let exposure = report.and_then(|report| report.exposure);
+            let exposure = exposure.with_context(|| {
+                format!(
+                    "frame {frame} ended before its exposure was known, which all frames are to have: give it more \
+                     --time, or give --exposure"
+                )
+            })?;
+            let kept = KeptExposure { frame, exposure };
+            write_json(&out.join(KEPT), &kept)?;
+            given = Some(kept);
+        }
+        let to_go = frames.iter().count().saturating_sub(rows.len());
+        if !run.quiet && !done && to_go > 0 {
+            let left = began.elapsed().as_secs_f64() / f64::from(rendered) * to_go as f64;
             let left = HumanDuration(Duration::from_secs_f64(left));
             note!("frame {frame} of {first} to {last} done, about {left} to go");
         }
@@ -105,6 +200,34 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
         sum_up(out, &rows)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What is unwise about one seed for all frames.
+pub const ONE_SEED: &str = "with one seed for all frames, their noise stands still on the screen, like dirt on the lens: it takes about three \
+     times the samples to vanish. Leave out --same-seed";
+
+/// Says what is unwise about a sequence.
+fn warn(sequence: &SequenceRun) {
+    let RenderRun { job, quiet, .. } = &sequence.run;
+    if *quiet {
+        return;
+    }
+    if job.source.same_seed {
+        note!("warning: {ONE_SEED}");
+    }
+    let in_film = job.frames_per_second.or(job.viewing.and_then(|viewing| viewing.frames_per_second()));
+    if in_film.is_none() && !job.source.same_seed && matches!(job.criterion, CriterionJob::Oracle { .. }) {
+        note!(
+            "each frame is judged as a still; as a frame of a film, whose noise is new in each, it needs about half of \
+             the samples or less: --fps 24"
+        );
+    }
+    if sequence.exposure == SequenceExposure::Each && job.tone.settles() {
+        note!(
+            "warning: each frame settles an exposure of its own. Those of frames that differ by noise alone differ by \
+             several percent, and the film flickers: leave out --exposure-from each"
+        );
+    }
 }
 
 /// Renders in a process of its own.
@@ -126,10 +249,9 @@ fn read(out: &Path) -> Option<FrameReport> {
 }
 
 fn row(frame: u32, report: &FrameReport) -> FrameRow {
-    let &FrameReport { complete, width, height, samples, unfamiliar_tiles, seconds_before, seconds_total } =
-        report;
-    let spp = samples as f64 / (width * height).max(1) as f64;
-    let seconds = seconds_before + seconds_total.unwrap_or(0.0);
+    let spp = report.samples as f64 / (report.width * report.height).max(1) as f64;
+    let seconds = report.seconds_before + report.seconds_total.unwrap_or(0.0);
+    let FrameReport { complete, unfamiliar_tiles, .. } = *report;
     FrameRow { frame, complete, spp, seconds, unfamiliar_tiles }
 }
 

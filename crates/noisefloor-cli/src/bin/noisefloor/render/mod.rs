@@ -30,7 +30,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tev::Tev;
 
-pub use frames::{SequenceRun, one_frame, render_frames};
+pub use frames::{ONE_SEED, SequenceExposure, SequenceRun, exposure_of, one_frame, render_frames};
 pub use progress::reference_bar;
 pub use tev::ADDRESS as TEV_ADDRESS;
 

@@ -1,0 +1,196 @@
+#!/usr/bin/env python3
+"""How near frames of films, judged one by one, come to the package `cvvdp` in video mode (no code of this project but its
+command, which is what is measured).
+
+    pip install cvvdp==0.5.7 OpenEXR pillow
+    docs/benchmarks/film.py render FOLDER NOISEFLOOR     renders that are there are kept; on two cores an hour
+    docs/benchmarks/film.py table FOLDER NOISEFLOOR
+    docs/benchmarks/film.py denoised FOLDER NOISEFLOOR   needs mitsuba-oidn==0.1.2 as well
+
+Frames are renders of a still view with one seed each. The truth is the mean of all of them, each by its samples. All are
+shown by Reinhard's operator at the exposure of the truth, in 8 bits. Of a film, what is lost is pooled over its frames as
+the package does, after the first quarter of a second, in which the package sees the first frame standing still."""
+import json, math, pathlib, subprocess, sys, tempfile
+import numpy as np
+
+SCENES = {s: (16, 48, 128) for s in ("cornell-box", "arcade")}
+SCENES |= {s: (48,) for s in ("bulb", "softbox", "courtyard", "door-ajar", "glass-spheres", "plates")}
+FRAMES, EDGE, RATES = 30, 192, (24, 25, 30, 60)
+# Frames that are judged one by one
+JUDGED = 6
+DISPLAY = "standard_fhd"
+
+task, folder, program = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3]
+renders = [(scene, spp, seed) for scene in SCENES for spp in SCENES[scene] for seed in range(1, FRAMES + 1)]
+
+if task == "render":
+    for scene, spp, seed in renders:
+        out = folder / f"{scene}-{spp}-{seed}"
+        if not (out / "image.exr").exists():
+            size, stop = f"{EDGE}x{EDGE}", ["--criterion", f"spp:{spp}", "--max-spp", str(spp), "--autosave", "0"]
+            subprocess.run([program, "render", scene, "--size", size, *stop, "--seed", str(seed), "--quiet", "--force",
+                            "--out", str(out)], check=True)
+    sys.exit()
+
+import OpenEXR, torch, pycvvdp
+from PIL import Image
+
+torch.set_num_threads(1)
+metric = pycvvdp.cvvdp(display_name=DISPLAY, quiet=True, device=torch.device("cpu"))
+weights = np.array([0.2126, 0.7152, 0.0722])
+
+
+def read(scene, spp, seed):
+    channels = OpenEXR.File(str(folder / f"{scene}-{spp}-{seed}" / "image.exr")).channels()
+    if "RGB" in channels:
+        return np.asarray(channels["RGB"].pixels, dtype=np.float64)[..., :3]
+    return np.stack([np.asarray(channels[c].pixels, dtype=np.float64) for c in "RGB"], axis=-1)
+
+
+def shown(linear, exposure):
+    """Reinhard et al. 2002, eq. 3, then sRGB in 8 bits."""
+    exposed = np.maximum(linear, 0) * exposure
+    light = np.clip(exposed / (1 + exposed @ weights)[..., None], 0, 1)
+    code = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.round(255 * code).astype(np.uint8)
+
+
+def still(test, reference):
+    return 10 - float(metric.predict(test / np.float32(255), reference / np.float32(255), dim_order="HWC")[0])
+
+
+def film(frames, references, rate):
+    """JODs lost after the first quarter of a second."""
+    as_code = lambda pictures: np.ascontiguousarray(np.asarray(pictures) / np.float32(255))
+    _, stats = metric.predict(as_code(frames), as_code(references), dim_order="FHWC", frames_per_second=rate)
+    lost = torch.as_tensor(stats["Q_per_ch"])[:, :, 2 * math.ceil(0.25 * rate / 2):]
+    return 10 - float(metric.do_pooling_and_jods(lost))
+
+
+def here(frames, references, viewing):
+    """JODs lost by frames judged one by one, on average: by the command."""
+    lost = []
+    with tempfile.TemporaryDirectory() as scratch:
+        test, reference = (pathlib.Path(scratch) / name for name in ("test.png", "reference.png"))
+        for one, truth in zip(frames, references):
+            Image.fromarray(one).save(test)
+            Image.fromarray(truth).save(reference)
+            said = subprocess.run([program, "metrics", str(test), str(reference), "--json", "--viewing", viewing],
+                                  check=True, capture_output=True, text=True).stdout
+            lost.append(10 - json.loads(said)["cvvdp_jod"])
+    return float(np.mean(lost))
+
+
+def weaker(test, reference, contrast):
+    return np.clip(np.round(reference + contrast * (test.astype(np.float64) - reference)), 0, 255).astype(np.uint8)
+
+
+def contrast_of(test, reference, lost):
+    """The contrast of the noise at which a still loses as much."""
+    low, high = 0.1, 2.0
+    for _ in range(9):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if still(weaker(test, reference, middle), reference) < lost else (low, middle)
+    return math.sqrt(low * high)
+
+
+def truth_of(scene):
+    """The mean of all renders, what it looks like, and at which exposure."""
+    levels = SCENES[scene]
+    pictures = {spp: [read(scene, spp, seed) for seed in range(1, FRAMES + 1)] for spp in levels}
+    truth = sum(spp * np.sum(of, axis=0) for spp, of in pictures.items()) / (FRAMES * sum(levels))
+    exposure = 0.18 / math.exp(np.mean(np.log(truth @ weights + 1e-6)))
+    return pictures, shown(truth, exposure), exposure
+
+
+if task == "denoised":
+    import mitsuba_oidn as oidn
+
+    device = oidn.Device(oidn.DeviceType.CPU)
+    device.num_threads = 1
+    device.commit()
+    filter = device.new_filter("RT")
+    filter.hdr, filter.quality = True, oidn.Quality.High
+
+    def denoise(picture):
+        """Of radiance alone."""
+        made = np.empty((EDGE, EDGE, 3), np.float32)
+        filter.set_image("color", np.maximum(picture, 0).astype(np.float32))
+        filter.set_image("output", made)
+        filter.execute()
+        return made
+
+    def write(path, picture):
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"RGB": np.ascontiguousarray(picture, np.float32)}).write(str(path))
+
+    def estimate(halves, cleaned, exposure, spp, viewing):
+        """JODs lost by the mean of two denoised halves, from the halves alone: by the command."""
+        with tempfile.TemporaryDirectory() as scratch:
+            paths = [str(pathlib.Path(scratch) / f"{name}.exr") for name in ("a", "b", "da", "db")]
+            for path, picture in zip(paths, (*halves, *cleaned)):
+                write(path, picture)
+            a, b, da, db = paths
+            judge = [program, "judge", a, "--spp", str(spp), "--against", b, "--spp", str(spp), "--independent"]
+            options = ["--denoised", da, db, "--tile", str(EDGE), "--exposure", str(exposure), "--viewing", viewing, "--json"]
+            said = subprocess.run(judge + options, check=True, capture_output=True, text=True).stdout
+            return json.loads(said)["tiles"][0]["jods_lost"]
+
+    print("| denoised | spp | still: package, here | 24 fps: package, here |\n|---|---|---|---|")
+    for scene in ("cornell-box", "arcade"):
+        pictures, reference, exposure = truth_of(scene)
+        for spp, of in pictures.items():
+            pairs = [(of[2 * i], of[2 * i + 1]) for i in range(FRAMES // 2)]
+            cleaned = [tuple(map(denoise, pair)) for pair in pairs]
+            frames = [shown((a + b) / 2, exposure) for a, b in cleaned]
+            alone = np.mean([still(one, reference) for one in frames[::3]])
+            together = film(frames, [reference] * len(frames), 24.0)
+            found = [np.mean([estimate(pair, made, exposure, spp, f"{DISPLAY}{rate}") for pair, made in
+                              list(zip(pairs, cleaned))[::3]]) for rate in ("", ",fps=24")]
+            print(f"| {scene} | {2 * spp} | {alone:.2f}, {found[0]:.2f} | {together:.2f}, {found[1]:.2f} |", flush=True)
+    sys.exit()
+
+rows, moving = [], []
+for scene in SCENES:
+    pictures, reference, exposure = truth_of(scene)
+    for spp, of in pictures.items():
+        frames = [shown(picture, exposure) for picture in of]
+        few = frames[:: FRAMES // JUDGED]
+        row = dict(scene=scene, spp=spp, still=np.mean([still(one, reference) for one in few]),
+                   same=film([frames[0]] * 8, [reference] * 8, 24.0))
+        for rate in RATES:
+            row[f"package {rate}"] = film(frames, [reference] * FRAMES, float(rate))
+            row[f"here {rate}"] = here(few, [reference] * len(few), f"{DISPLAY},fps={rate}")
+            row[f"contrast {rate}"] = contrast_of(few[0], reference, row[f"package {rate}"])
+        rows.append((row, few[0], reference))
+        print(json.dumps({k: v if isinstance(v, str) else round(float(v), 4) for k, v in row.items()}), file=sys.stderr,
+              flush=True)
+        # A camera that turns: a window that moves over the picture by two pixels a frame, a degree and a quarter a second
+        if scene in ("cornell-box", "arcade") and spp == 48:
+            part = EDGE - 2 * FRAMES
+            window = lambda picture, i: np.ascontiguousarray(picture[: part, 2 * i : 2 * i + part])
+            moved = [window(one, i) for i, one in enumerate(frames)]
+            beside = [window(reference, i) for i in range(FRAMES)]
+            step = FRAMES // JUDGED
+            moving.append((scene, film(moved, beside, 24.0), here(moved[::step], beside[::step], f"{DISPLAY},fps=24"),
+                           film([window(one, 0) for one in frames], [beside[0]] * FRAMES, 24.0)))
+
+print("| scene | spp | still | " + " | ".join(f"{rate} fps: package, here" for rate in RATES) + " | one seed, 24 fps |")
+print("|---|---|---|" + "---|" * (len(RATES) + 1))
+for row, _, _ in rows:
+    cells = [f"{row[f'package {rate}']:.2f}, {row[f'here {rate}']:.2f}" for rate in RATES]
+    print(f"| {row['scene']} | {row['spp']} | {row['still']:.2f} | " + " | ".join(cells) + f" | {row['same']:.2f} |")
+print("\n| fps | off by at most, on average (JOD) | samples that a film needs, of a still's: least, mean, most |"
+      " a factor instead: off by at most, on average |")
+print("|---|---|---|---|")
+for rate in RATES:
+    off = np.array([abs(row[f"package {rate}"] - row[f"here {rate}"]) for row, _, _ in rows])
+    factors = np.array([row[f"contrast {rate}"] ** 2 for row, _, _ in rows])
+    factor = math.exp(np.mean(np.log(factors)))
+    by_factor = np.array([abs(still(weaker(test, reference, math.sqrt(factor)), reference) - row[f"package {rate}"])
+                          for row, test, reference in rows])
+    print(f"| {rate} | {off.max():.3f}, {off.mean():.3f} | ×{factors.min():.2f}, ×{factor:.2f}, ×{factors.max():.2f} | "
+          f"{by_factor.max():.3f}, {by_factor.mean():.3f} |")
+print("\n| a camera that turns, 24 fps | package | here | package, standing still |\n|---|---|---|---|")
+for scene, package, found, standing in moving:
+    print(f"| {scene}, 48 spp | {package:.2f} | {found:.2f} | {standing:.2f} |")
