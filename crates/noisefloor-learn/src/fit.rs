@@ -11,7 +11,7 @@ use noisefloor::{
     internal::nearest,
     model::{Familiarity, ModelParts, TrainingRecord},
     oracle::Spread,
-    svm::{Classifier, Platt, Scaler, SvmParams, fit_platt},
+    svm::{Classifier, Platt, Scaler, SvmParams, SvmTrainError, fit_platt},
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -29,6 +29,13 @@ struct Material<'a> {
 struct Fold<'a> {
     machine: Fitted,
     zones: Vec<&'a Zone>,
+}
+
+/// A sigmoid, fitted to examples that the machine has not seen, and the [`order`] of these.
+#[derive(Clone, Copy)]
+struct Sigmoid {
+    platt: Platt,
+    order: f64,
 }
 
 impl<'a> Material<'a> {
@@ -54,38 +61,92 @@ impl<'a> Material<'a> {
         let answers: Vec<&Answer> =
             self.answers.iter().copied().filter(|a| Some(&*a.group) != group).collect();
         let least = self.table.descriptor.least_deviation();
-        Fitted::fit(&zones, &answers, svm, self.params, least, &weighed(self.table, self.params))
+        let fitted =
+            Fitted::fit(&zones, &answers, svm, self.params, least, &weighed(self.table, self.params));
+        fitted.map_err(|error| match error {
+            TrainError::Svm(SvmTrainError::OneClass { examples, converged }) => {
+                let without = group.map(str::to_owned);
+                TrainError::Alike { without, examples, converged: converged > 0 }
+            }
+            other => other,
+        })
     }
 
-    /// Machines that have not seen one group judge that group; one sigmoid is fitted to all of that.
-    fn cross_validate(&self, svm: SvmParams) -> Result<(Vec<Fold<'a>>, Platt), TrainError> {
+    /// All groups, of zones and of answers.
+    fn groups(&self) -> BTreeSet<&'a str> {
+        self.zones.iter().map(|z| &*z.group).chain(self.answers.iter().map(|a| &*a.group)).collect()
+    }
+
+    /// What a machine that has not seen a group says of it: (decision value, 0 or 1) of each example.
+    fn decisions(&self, machine: &Fitted, group: &str) -> Vec<(f32, f64)> {
+        let zones = self.zones.iter().filter(|z| z.group == group);
+        let answers = self.answers.iter().filter(|a| a.group == group);
+        let of_zones = zones.flat_map(|zone| machine.decisions(zone, self.params));
+        of_zones.chain(answers.flat_map(|answer| machine.answered(answer))).collect()
+    }
+
+    /// The error that says which groups are in no order for machines that have not seen them.
+    fn unrelated(&self, svm: SvmParams) -> TrainError {
+        let all = self.groups();
+        let mut groups = Vec::new();
+        for &group in &all {
+            match self.fit_without(Some(group), svm) {
+                Ok(machine) if order(&self.decisions(&machine, group)) < ORDER => {
+                    groups.push(group.to_owned())
+                }
+                Ok(_) => {}
+                Err(error) => return error,
+            }
+        }
+        TrainError::Unrelated { groups, of: all.len() }
+    }
+
+    /// Machines that have not seen one group judge that group; one sigmoid is fitted to all of that, and it is said
+    /// in what [`order`] it is.
+    fn cross_validate(&self, svm: SvmParams) -> Result<(Vec<Fold<'a>>, Sigmoid), TrainError> {
         let (mut folds, mut decisions) = (Vec::new(), Vec::new());
-        let groups: BTreeSet<&str> =
-            self.zones.iter().map(|z| &*z.group).chain(self.answers.iter().map(|a| &*a.group)).collect();
-        for group in groups {
+        for group in self.groups() {
             let machine = self.fit_without(Some(group), svm)?;
-            let zones: Vec<&Zone> = self.zones.iter().copied().filter(|z| z.group == group).collect();
-            for zone in &zones {
-                decisions.extend(machine.decisions(zone, self.params));
-            }
-            for answer in self.answers.iter().filter(|a| a.group == group) {
-                decisions.extend(machine.answered(answer));
-            }
+            decisions.extend(self.decisions(&machine, group));
+            let zones = self.zones.iter().copied().filter(|z| z.group == group).collect();
             folds.push(Fold { machine, zones });
         }
-        Ok((folds, fit_platt(&decisions)?))
+        match fit_platt(&decisions) {
+            Ok(platt) => Ok((folds, Sigmoid { platt, order: order(&decisions) })),
+            Err(SvmTrainError::Platt(_)) => Err(self.unrelated(svm)),
+            Err(other) => Err(other.into()),
+        }
     }
 
     /// Predictions with a pair of C and γ for zones whose groups were left out, and the sigmoid of these.
-    fn held_out(&self, svm: SvmParams) -> Result<(Vec<Prediction>, Platt), TrainError> {
-        let (folds, platt) = self.cross_validate(svm)?;
+    fn held_out(&self, svm: SvmParams) -> Result<(Vec<Prediction>, Sigmoid), TrainError> {
+        let (folds, sigmoid) = self.cross_validate(svm)?;
         let mut predictions: Vec<Prediction> = Vec::new();
         for Fold { machine, zones } in folds {
-            let fold = parts(self.table, machine.calibrated(platt), None, TrainingRecord::default());
+            let fold = parts(self.table, machine.calibrated(sigmoid.platt), None, TrainingRecord::default());
             predictions.extend(zones.iter().map(|z| predict(|raw| fold.judge(raw), People::DEFAULT, z)));
         }
-        Ok((predictions, platt))
+        Ok((predictions, sigmoid))
     }
+}
+
+/// Least [`order`] of what was learned from. Examples whose labels are mixed have one half, give or take 0.05; those of
+/// people 0.9 and more.
+const ORDER: f64 = 0.6;
+
+/// In how many of all pairs of a noisy and a converged example the converged one has the larger decision value, ties
+/// counting one half (Mann and Whitney 1947); 1 if one of the two is missing.
+fn order(decisions: &[(f32, f64)]) -> f64 {
+    let mut sorted = decisions.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut noisy, mut converged, mut right) = (0.0, 0.0, 0.0);
+    for equal in sorted.chunk_by(|a, b| a.0 == b.0) {
+        let new = equal.iter().filter(|d| d.1 > 0.5).count() as f64;
+        let others = equal.len() as f64 - new;
+        right += new * (noisy + 0.5 * others);
+        (noisy, converged) = (noisy + others, converged + new);
+    }
+    if noisy * converged > 0.0 { right / (noisy * converged) } else { 1.0 }
 }
 
 /// The numbers that a line weighs, and by how much each grows with ln(samples).
@@ -126,19 +187,24 @@ pub(crate) fn fit_groups(
     // Thresholds choose C and γ. Answers are none.
     let zones_only = material.without_answers();
     let outcome = |&svm: &SvmParams| {
-        let (predictions, platt) = zones_only.held_out(svm)?;
-        Ok((score(predictions.iter()).error_factor, platt))
+        let (predictions, sigmoid) = zones_only.held_out(svm)?;
+        Ok((score(predictions.iter()).error_factor, sigmoid))
     };
-    let outcomes: Vec<(f64, Platt)> =
+    let outcomes: Vec<(f64, Sigmoid)> =
         params.candidates.par_iter().map(outcome).collect::<Result<_, TrainError>>()?;
     let best = (0..outcomes.len())
         .min_by(|&i, &j| outcomes[i].0.total_cmp(&outcomes[j].0))
         .ok_or(TrainError::Params)?;
     let chosen = params.candidates[best];
 
+    let sigmoid = outcomes[best].1;
+    if sigmoid.order < ORDER || sigmoid.platt.a >= 0.0 {
+        return Err(zones_only.unrelated(chosen));
+    }
+
     // All groups train the machine; the sigmoid stays that of held-out decision values.
     let platt =
-        if material.answers.is_empty() { outcomes[best].1 } else { material.cross_validate(chosen)?.1 };
+        if material.answers.is_empty() { sigmoid.platt } else { material.cross_validate(chosen)?.1.platt };
     Ok((material.fit_without(None, chosen)?.calibrated(platt), chosen))
 }
 
@@ -179,7 +245,8 @@ fn spread(table: &Table, classifier: &Classifier) -> Option<Spread> {
         })
     };
     let slope = log_odds(0.5f32.exp())? - log_odds((-0.5f32).exp())?;
-    let scenes = std::f64::consts::PI / 3f64.sqrt() / slope;
+    // A curve that does not rise there knows nothing of ln(samples)
+    let scenes = if slope > 0.0 { std::f64::consts::PI / 3f64.sqrt() / slope } else { f64::INFINITY };
     Some(Spread { scenes: scenes.clamp(0.01, 10.0), people: Spread::PEOPLE })
 }
 
@@ -209,4 +276,18 @@ pub(crate) fn familiarity(table: &Table, groups: &[&str], scaler: &Scaler) -> Op
     let within = (FAMILIAR * distances.len() as f64).ceil() as usize;
     let reach = *distances.get(within.checked_sub(1)?)?;
     Some(Familiarity { zones: known.into_iter().map(|(_, numbers)| numbers).collect(), reach })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_of_examples_is_that_of_their_pairs() {
+        let examples = [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (2.0, 1.0)];
+        // Of 2 × 2 pairs, three are right and one is a tie
+        assert_eq!(order(&examples), 3.5 / 4.0);
+        assert_eq!(order(&examples.map(|(decision, converged)| (-decision, converged))), 0.5 / 4.0);
+        assert_eq!((order(&[]), order(&[(3.0, 1.0)])), (1.0, 1.0));
+    }
 }

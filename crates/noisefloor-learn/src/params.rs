@@ -80,6 +80,35 @@ pub enum TrainError {
     /// The machine.
     #[error(transparent)]
     Svm(#[from] SvmTrainError),
+    /// All examples are noisy, or all are converged.
+    #[error(
+        "all {examples} examples{} are {}, and training needs both: check that every threshold lies between the first \
+         and the last level of its zone, and that not all zones are censored",
+        without.as_ref().map_or(String::new(), |group| format!(" without those of {group}")),
+        if *converged { "converged" } else { "noisy" }
+    )]
+    Alike {
+        /// The group that was left out, if one was.
+        without: Option<String>,
+        /// All examples.
+        examples: usize,
+        /// What they are.
+        converged: bool,
+    },
+    /// What people said has nothing to do with what was measured of the noise.
+    #[error(
+        "what people said does not follow the noise: in {} of {of} groups of scenes ({}), what was learned from the \
+         others does not tell noisy examples from converged ones; check that every threshold stands beside its own \
+         zone, and that each zone's pictures are in the order of their samples",
+        groups.len(),
+        groups.join(", ")
+    )]
+    Unrelated {
+        /// The groups of which this is so; of all together it is.
+        groups: Vec<String>,
+        /// All groups.
+        of: usize,
+    },
     /// A parameter out of range.
     #[error("training needs candidates for C and γ, a range above 1 and a spread above 0")]
     Params,

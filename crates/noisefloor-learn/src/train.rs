@@ -270,6 +270,46 @@ mod tests {
         }
     }
 
+    /// Machines of both kinds say what is wrong with what people are said to have seen, and not what a solver met.
+    #[test]
+    fn thresholds_that_have_nothing_to_do_with_the_noise_are_an_error_in_words() {
+        for params in [TrainParams::default(), TrainParams::svm()] {
+            let refuse = |table: &Table, words: &[&str]| {
+                let error = train(table, &params, String::new(), None).unwrap_err();
+                let said = error.to_string();
+                assert!(words.iter().all(|word| said.contains(word)), "{said}");
+                // Nor in what a command prints after it
+                assert!(std::error::Error::source(&error).is_none(), "{error:?}");
+            };
+
+            // Nobody has reached a threshold
+            let mut censored = table(4);
+            censored.zones.iter_mut().for_each(|zone| zone.censored = true);
+            refuse(&censored, &["examples without those of scene0 are noisy", "not all zones are censored"]);
+            // The first level is clean enough for all
+            let mut clean = table(4);
+            clean.zones.iter_mut().for_each(|zone| zone.human_spp = 20.0);
+            refuse(&clean, &["are converged", "between the first and the last level"]);
+            // In no order, with one threshold for all
+            for seed in 0..4 {
+                let mut mixed = table(4);
+                let mut random = noisefloor_testkit::Noise::new(seed);
+                for zone in &mut mixed.zones {
+                    zone.human_spp = 400.0;
+                    for i in (1..zone.levels.len()).rev() {
+                        let j = (random.uniform() * (i + 1) as f64) as usize;
+                        let other = zone.levels[j].descriptor.clone();
+                        zone.levels[j].descriptor = std::mem::replace(&mut zone.levels[i].descriptor, other);
+                    }
+                }
+                refuse(
+                    &mixed,
+                    &["does not follow the noise", "of 4 groups of scenes (scene", "its own zone"],
+                );
+            }
+        }
+    }
+
     /// A line separates these classes, and nothing holds it back: it is steep, and still a model.
     #[test]
     fn next_to_no_penalty_is_survived() {

@@ -22,6 +22,7 @@ pub(crate) struct PyJudged {
     size: (usize, usize),
     verdicts: Vec<PyVerdict>,
     samples: Samples,
+    warnings: Vec<String>,
     visible_noise: Option<Vec<f32>>,
 }
 
@@ -42,6 +43,13 @@ impl PyJudged {
         }
     }
 
+    /// What is likely wrong with the two pictures, a list of texts: their noise is filtered, or one has another
+    /// exposure.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
     /// How visible the noise is, 1 where it is just seen: float32 of shape (height, width); None if
     /// the model makes no map.
     fn visible_noise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
@@ -54,14 +62,16 @@ impl PyJudged {
         size: (usize, usize),
         verdicts: Vec<PyVerdict>,
         samples: &str,
+        warnings: Vec<String>,
         visible_noise: Option<PyReadonlyArray2<'_, f32>>,
     ) -> PyResult<Self> {
         let visible_noise = visible_noise.map(|map| map.as_array().iter().copied().collect());
-        Ok(Self { size, verdicts, samples: sharing(samples)?, visible_noise })
+        Ok(Self { size, verdicts, samples: sharing(samples)?, warnings, visible_noise })
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        reduced::<Self>(py, (self.size, self.verdicts(), self.samples(), self.visible_noise(py)?))
+        let kept = (self.size, self.verdicts(), self.samples(), self.warnings(), self.visible_noise(py)?);
+        reduced::<Self>(py, kept)
     }
 }
 
@@ -74,6 +84,7 @@ impl PyJudged {
 ///     pictures, where they show it.
 /// oracle: an Oracle; None is Oracle(). params: tile size, display and audience; None is Params().
 ///
+/// Look at the warnings of what it returns: pictures that were denoised, or exposed otherwise, are judged wrongly.
 /// The interpreter's lock is released while judging.
 ///
 /// Raises SizeError, ParameterError, CriterionError, and PictureError if the pictures cannot be judged.
@@ -142,6 +153,7 @@ fn judge_still(
         size: image.size,
         verdicts: grid.tiles().zip(verdicts).map(|(tile, verdict)| PyVerdict::of(tile, verdict)).collect(),
         samples: pair.samples(),
+        warnings: pair.warnings().iter().map(ToString::to_string).collect(),
         visible_noise,
     })
 }

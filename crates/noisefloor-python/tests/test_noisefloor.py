@@ -399,8 +399,21 @@ class Pictures(unittest.TestCase):
         shown = [np.uint8(np.clip(noisy(seed, 20), 0, 1) ** (1 / 2.2) * 255) for seed in (1, 2)]
         shown = nf.judge(shown[0], 20, shown[1], 20, samples="independent", params=params, encoding="srgb")
         self.assertEqual([verdict.converged for verdict in shown.verdicts], [False, False])
+        self.assertEqual(seen.warnings, [])
         noise = seen.visible_noise()
         self.assertEqual((noise.shape, noise.dtype), ((64, 96), np.float32))
+
+    def test_pictures_that_do_not_belong_together_are_warned_of(self):
+        """Blurred by 3x3 pixels; and the other with three times the exposure. Each warning is kept by pickle."""
+        def blur(image):
+            around = [np.roll(image, (dy, dx), (0, 1)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+            return np.float32(np.mean(around, axis=0))
+        one, other = noisy(1, 20), noisy(2, 20)
+        for word, pair in (("denoised, blurred", (blur(one), blur(other))), ("exposure", (one, 3 * other))):
+            with self.subTest(word):
+                judged = nf.judge(pair[0], 20, pair[1], 20, samples="independent")
+                self.assertEqual([word in text for text in judged.warnings], [True])
+                self.assertEqual(pickle.loads(pickle.dumps(judged)).warnings, judged.warnings)
 
     def test_metrics_are_those_of_arithmetic(self):
         image, reference = np.full((16, 12, 3), 0.3), np.full((16, 12, 3), 0.2)

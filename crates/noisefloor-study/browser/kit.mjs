@@ -6,7 +6,7 @@ import { createRequire } from "node:module";
 import { readFileSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { chromium } from "playwright-core";
+import { chromium, firefox } from "playwright-core";
 
 const shots = process.env.NOISEFLOOR_SCREENSHOTS;
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -14,13 +14,18 @@ export const SMALL = { width: 1024, height: 640 };
 export const LARGE = { width: 1920, height: 1080 };
 /** Time after which something on a page has failed to come, in milliseconds; long, since tests run side by side. */
 const PATIENCE = 60000;
+/** Screenshots without a style that hides the caret: in Firefox, the policy of the pages forbids it. */
+const BARE = { caret: "initial" };
 /** Tests of one file that know nothing of one another: most of their time is spent waiting. */
 export const SIDE_BY_SIDE = { concurrency: 3 };
+
+/** Firefox as it is installed, driven by WebDriver BiDi, if the environment asks for it; Chromium otherwise. */
+export const FIREFOX = process.env.NOISEFLOOR_BROWSER === "firefox";
 
 let browser;
 const profile = mkdtempSync(join(tmpdir(), "noisefloor-browser-"));
 
-const launch = (...more) =>
+const launch_chromium = (...more) =>
   chromium.launch({
     executablePath: "/usr/bin/chromium",
     args: [
@@ -37,6 +42,17 @@ const launch = (...more) =>
     env: { ...process.env, HOME: profile },
   });
 
+const launch_firefox = (firefoxUserPrefs = {}, ...args) =>
+  firefox.launch({
+    channel: "moz-firefox",
+    executablePath: "/usr/bin/firefox-esr",
+    args,
+    firefoxUserPrefs,
+    env: { ...process.env, HOME: profile },
+  });
+
+const launch = () => (FIREFOX ? launch_firefox() : launch_chromium());
+
 before(async () => {
   browser = await launch();
   if (shots) mkdirSync(shots, { recursive: true });
@@ -48,7 +64,9 @@ after(async () => {
 
 /** A window of a system whose scaling is not 100 %. */
 export async function openScaled(t, url, ratio) {
-  const scaled = await launch(`--force-device-scale-factor=${ratio}`, "--window-size=2400,1500");
+  const scaled = FIREFOX
+    ? await launch_firefox({ "layout.css.devPixelsPerPx": String(ratio) }, "--width=2400", "--height=1500")
+    : await launch_chromium(`--force-device-scale-factor=${ratio}`, "--window-size=2400,1500");
   const context = await scaled.newContext({ viewport: null, locale: "en-GB" });
   t.after(() => scaled.close());
   const page = await context.newPage();
@@ -99,7 +117,20 @@ export async function accessible(page, name) {
 }
 
 export async function shot(page, name) {
-  if (shots) await page.screenshot({ path: join(shots, `${name}.png`) });
+  if (shots) await page.screenshot({ path: join(shots, `${name}.png`), ...BARE });
+}
+
+/** Puts a number in place of the one in a field, by keys: what `fill` does in Firefox adds to it. */
+export async function retype(page, id, text) {
+  await page.locator(id).press("Control+A");
+  await page.keyboard.type(text);
+}
+
+/** The bytes of the file that `act` saves; Firefox does not tell its driver of downloads, so there `otherwise` says. */
+export async function saved(page, act, otherwise) {
+  const download = FIREFOX ? null : page.waitForEvent("download");
+  await act();
+  return download ? readFileSync(await (await download).path()) : otherwise();
 }
 
 export const heading = (page, text) => page.getByRole("heading", { name: text }).waitFor();
@@ -188,7 +219,7 @@ export async function unscaled(page, ratio) {
   for (const at of [box.x, box.y])
     assert.ok(Math.abs(at * ratio - Math.round(at * ratio)) < 0.02, JSON.stringify(box));
   // The whole window: clips are rounded to CSS pixels
-  const png = await page.screenshot({ scale: "device" });
+  const png = await page.screenshot({ scale: "device", ...BARE });
   return canvas.evaluate(
     async (picture, [base64, x, y]) => {
       const shown = await createImageBitmap(

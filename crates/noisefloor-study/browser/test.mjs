@@ -2,19 +2,20 @@
 
 import { describe, test } from "node:test";
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
 import {
   LARGE,
   SIDE_BY_SIDE,
   SMALL,
   accessible,
   arrive,
+  code,
   heading,
   look,
   measure,
   open,
   openScaled,
   reach,
+  saved,
   settled,
   shot,
   test_picture,
@@ -109,12 +110,13 @@ describe("the pages of a study", SIDE_BY_SIDE, () => {
     await heading(page, "Thank you");
     await accessible(page, "farewell");
     await shot(page, "small-farewell");
-    const download = page.waitForEvent("download");
-    await page.getByRole("button", { name: "Save my answers" }).click();
-    const text = readFileSync(await (await download).path(), "utf8");
-    const saved = JSON.parse(text);
+    const of = await code(page);
+    const save = () => page.getByRole("button", { name: "Save my answers" }).click();
+    const asked = () => page.evaluate(async (of) => (await fetch(`api/sessions/${of}/export`)).text(), of);
+    const text = String(await saved(page, save, asked));
+    const answers = JSON.parse(text);
     assert.match(text, /"seed": ?"\d+"/, "the seed is exact, as text");
-    const steps = saved.events.map((e) => e.event).filter((e) => e.kind === "step");
+    const steps = answers.events.map((e) => e.event).filter((e) => e.kind === "step");
     assert.equal(steps.length, 6 + 21 + 4);
     assert.ok(
       steps.every((s) => s.ms >= 300) &&

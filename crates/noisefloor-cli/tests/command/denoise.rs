@@ -144,6 +144,8 @@ fn denoised_pictures_made_elsewhere() {
     let clean = say(&["--independent", "--denoised", &good, &good2, "--noise-map", &map]);
     assert!(clean.contains("4 of 4 denoised tiles") && clean.contains("nobody has been asked"), "{clean}");
     assert!(Path::new(&map).exists());
+    // Any number of threads says the same
+    assert_eq!(say(&["--independent", "--threads", "1", "--denoised", &good, &good2]), clean);
     let json = say(&["--independent", "--json", "--denoised", &bad, &bad2]);
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");

@@ -76,10 +76,10 @@ pub(super) async fn overview(State(app): State<Arc<App>>, headers: HeaderMap) ->
 async fn row(app: &App, record: SessionRecord, now_ms: u64) -> Result<OverviewRow, Refusal> {
     let SessionRecord { code, ids, group, begun_ms, received_ms, .. } = record;
     let last_ms = received_ms.last().copied().unwrap_or(begun_ms);
-    let minutes = (last_ms - received_ms.first().copied().unwrap_or(last_ms).min(last_ms)) as f64 / 60_000.0;
+    let minutes = passed_ms(&received_ms) as f64 / 60_000.0;
     app.with(&code, |session| {
         let progress = session.progress();
-        let silent = now_ms.saturating_sub(last_ms);
+        let silent = silent_ms(now_ms, last_ms);
         let state = match session.stage() {
             Stage::Finished => "finished",
             Stage::ScreenedOut => "screened-out",
@@ -103,4 +103,32 @@ async fn row(app: &App, record: SessionRecord, now_ms: u64) -> Result<OverviewRo
         }
     })
     .await
+}
+
+/// Time since the last event. A clock that was set back since then says only that it was another time: who is still
+/// there will soon be heard by the new one.
+fn silent_ms(now_ms: u64, last_ms: u64) -> u64 {
+    now_ms.abs_diff(last_ms)
+}
+
+/// Time from the first event to the last, without what a clock that is set back between two events takes away.
+fn passed_ms(received_ms: &[u64]) -> u64 {
+    received_ms.windows(2).map(|two| two[1].saturating_sub(two[0])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MINUTE: u64 = 60_000;
+
+    #[test]
+    fn a_clock_that_is_set_back_makes_nobody_active_or_fast() {
+        assert_eq!(silent_ms(100 * MINUTE, 99 * MINUTE), MINUTE);
+        assert!(silent_ms(40 * MINUTE, 100 * MINUTE) > DROPOUT_MS);
+        // Ten minutes, an hour back, and three minutes more
+        let received = [100, 105, 110, 50, 53].map(|minute| minute * MINUTE);
+        assert_eq!(passed_ms(&received), 13 * MINUTE);
+        assert_eq!((passed_ms(&received[..1]), passed_ms(&[])), (0, 0));
+    }
 }

@@ -48,8 +48,10 @@
 //! # What is not noticed
 //! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in
 //! floating point, or sums, in batches of one size whose noise does not reach white: equal batches of them
-//! are as independent as any. Counts that are all wrong by one factor. Tiles that were mixed up where the
-//! picture hardly varies along their borders, and a whole picture that is upside down.
+//! are as independent as any. That nothing is above 1 says little: a sky or a lamp of 1 is as common. Counts
+//! that are all wrong by one factor, or that grow with batches of few samples, where a few fireflies make
+//! all noise energy. Tiles that were mixed up where the picture hardly varies along their borders beside its
+//! noise, and a whole picture that is upside down.
 
 mod borders;
 mod correlation;

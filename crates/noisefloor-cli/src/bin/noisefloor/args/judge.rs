@@ -58,7 +58,7 @@ pub struct JudgeArgs {
     independent: bool,
     /// Judge denoised pictures: what a denoiser has made of IMAGE, and of the one --against, each without a
     /// look at the other.
-    #[arg(long, num_args = 2, value_names = ["IMAGE", "AGAINST"], conflicts_with_all = ["model", "threshold", "heat_map", "exr", "nested", "threads"])]
+    #[arg(long, num_args = 2, value_names = ["IMAGE", "AGAINST"], conflicts_with_all = ["model", "threshold", "heat_map", "exr", "nested"])]
     denoised: Vec<PathBuf>,
     /// With --denoised: just-objectionable differences (JOD) that a tile may have lost.
     #[arg(long, value_name = "JOD", requires = "denoised", default_value_t = DEFAULT_JODS_LOST, value_parser = values::jods)]
@@ -119,6 +119,7 @@ impl JudgeArgs {
             tone,
             viewing: self.viewing.or_default(),
             tile: self.tile,
+            threads: self.threads,
             json: self.json,
             noise_map: self.noise_map,
         })

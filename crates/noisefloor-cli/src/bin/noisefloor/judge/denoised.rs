@@ -13,6 +13,7 @@ use noisefloor_image::check_writable;
 use noisefloor_image::maps::{Canvas, draw_field};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::Serialize;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 /// Two halves, and what a denoiser has made of each.
@@ -27,6 +28,7 @@ pub struct DenoisedJob {
     pub tone: ToneMapping,
     pub viewing: Viewing,
     pub tile: usize,
+    pub threads: Option<NonZeroUsize>,
     pub json: bool,
     pub noise_map: Option<PathBuf>,
 }

@@ -51,9 +51,9 @@ pub enum Question {
 }
 
 pub fn run(question: &Question) -> anyhow::Result<()> {
-    if let Question::Noise(job) = question {
-        start_threads(job.threads)?;
-    }
+    let (Question::Noise(JudgeJob { threads, .. }) | Question::Denoised(DenoisedJob { threads, .. })) =
+        question;
+    start_threads(*threads)?;
     match question {
         Question::Noise(job) => judge_noise(job),
         Question::Denoised(job) => denoised::run(job),
