@@ -51,9 +51,11 @@ pub enum Question {
 }
 
 pub fn run(question: &Question) -> anyhow::Result<()> {
-    let (Question::Noise(JudgeJob { threads, .. }) | Question::Denoised(DenoisedJob { threads, .. })) =
-        question;
-    start_threads(*threads)?;
+    let threads = match question {
+        Question::Noise(job) => job.threads,
+        Question::Denoised(job) => job.threads,
+    };
+    start_threads(threads)?;
     match question {
         Question::Noise(job) => judge_noise(job),
         Question::Denoised(job) => denoised::run(job),
