@@ -179,8 +179,7 @@ impl<'a> Judges<'a> {
         let denoiser = match criterion {
             TuneCriterion::Noise(_) => None,
             TuneCriterion::Denoised { .. } => {
-                let mut plan = FilterPlan::default();
-                plan.timeout = timeout;
+                let plan = FilterPlan { timeout, ..FilterPlan::default() };
                 Some((Oidn::start(plan)?, pictures.guides()?))
             }
         };
