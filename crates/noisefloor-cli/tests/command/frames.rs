@@ -260,7 +260,10 @@ fn a_killed_sequence_is_resumed_as_if_it_had_not_been() {
     assert!(render(&out, &["--resume"]).status().unwrap().success());
     for frame in 1..=2 {
         let read = |out: &Path, name: &str| fs::read(out.join(format!("{frame:04}/{name}"))).unwrap();
-        assert!(["image.exr", "stops.csv"].iter().all(|name| read(&whole, name) == read(&out, name)), "{frame}");
+        assert!(
+            ["image.exr", "stops.csv"].iter().all(|name| read(&whole, name) == read(&out, name)),
+            "{frame}"
+        );
         let exposure = |out: &Path| json(&out.join(format!("{frame:04}/report.json")))["exposure"].clone();
         assert_eq!(exposure(&whole), exposure(&out));
     }
