@@ -100,7 +100,7 @@ fn models() {
 fn options() {
     let case = Case::new();
     let (out, truth) = (case.path("out"), case.path("small.exr"));
-    let bad: [(&[&str], &[&str]); 29] = [
+    let bad: [(&[&str], &[&str]); 30] = [
         (&["no-such-scene"], &["no-such-scene", "noisefloor scenes"]),
         (&["--tile", "0"], &["tile", "16…512"]),
         (&["--tile", "513"], &["513", "16…512"]),
@@ -118,7 +118,8 @@ fn options() {
         (&["--criterion", "psychic"], &["spp:"]),
         (&["--spp", "100"], &["--criterion spp:100"]),
         (&["--threads", "100000"], &["--threads", "1…1024"]),
-        (&["--exposure", "2"], &["--exposure", "--tone-mapping srgb"]),
+        (&["--exposure", "2", "--key", "0.2"], &["--exposure", "--key"]),
+        (&["--exposure", "0"], &["exposure of Reinhard"]),
         (&["--tone-mapping", "srgb", "--key", "0.2"], &["--key", "--tone-mapping reinhard"]),
         (&["--tone-mapping", "srgb", "--white", "2"], &["--white", "--tone-mapping reinhard"]),
         (&["--size", "64x64", "--no-mis", "--source", "exr"], &["--no-mis", "--source exr"]),

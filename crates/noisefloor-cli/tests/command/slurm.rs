@@ -1,5 +1,5 @@
 use crate::farm::{SCENE, assert_same, plan, render, shards, wait_for};
-use crate::kit::{command, stderr, text};
+use crate::kit::{command, json, stderr, text};
 use noisefloor_testkit::{Requirement, require};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -91,8 +91,11 @@ fn sequence(cluster: &Cluster, dir: &Path) {
     let said = cluster.run(&mut command(&args));
     assert!(said.contains("0005: done") && said.contains("0006: done"), "{said}");
     for frame in ["5", "6"] {
-        let one = dir.join(format!("one-{frame}"));
-        render(&one, &SCENE.replace("cornell-box", text(&xml(frame))));
-        assert_same(&one, &dir.join(format!("000{frame}")));
+        let (one, farmed) = (dir.join(format!("one-{frame}")), dir.join(format!("000{frame}")));
+        // Each frame has a seed of its own
+        let seed = json(&farmed.join("report.json"))["seed"].to_string();
+        let scene = SCENE.replace("cornell-box", text(&xml(frame)));
+        render(&one, &scene.replace("--seed 5", &format!("--seed {seed}")));
+        assert_same(&one, &farmed);
     }
 }
