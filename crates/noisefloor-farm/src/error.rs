@@ -12,8 +12,7 @@ use thiserror::Error;
 
 /// Version of the format of shards.
 pub(crate) const VERSION: u32 = 4;
-/// Longest header of a shard that is read: some 300,000 batches, or 50,000 with different samples in 100
-/// blocks each.
+/// Longest header of a shard that is read: some 300,000 batches.
 pub(crate) const MAX_HEADER: u64 = 64 << 20;
 /// Version of the format of plans; the first one held words of a command line.
 pub(crate) const PLAN_VERSION: u64 = 4;

@@ -3,8 +3,7 @@
 //! Layout: the container of models and checkpoints (magic, version, length and BLAKE3 of the header), whose
 //! payload is a header of JSON; then for each batch of the header, in its order, three f32 per pixel,
 //! row-major over its tile. Numbers are little-endian. The header has the BLAKE3 of each batch, so that a
-//! merge reads only the batch it needs. Where blocks of a tile got different numbers of samples, it has
-//! these, too.
+//! merge reads only the batch it needs.
 
 use crate::batch::PlannedBatch;
 use crate::error::{MAX_HEADER, ShardError, VERSION};

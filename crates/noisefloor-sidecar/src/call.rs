@@ -54,7 +54,7 @@ pub(crate) fn ask<T: DeserializeOwned>(
 #[derive(Debug)]
 pub(crate) struct Described {
     pub(crate) info: SourceInfo,
-    /// Whether parts of tiles may be asked for.
+    /// What the user should know.
     pub(crate) warnings: Vec<String>,
 }
 

@@ -32,7 +32,7 @@ pub struct Sidecar {
     launch: Launch,
     process: Option<Process>,
     info: SourceInfo,
-    /// Whether it is asked for parts of tiles.
+    /// The scene as it was when the process loaded it.
     identity: SourceIdentity,
     warnings: Vec<String>,
     restarts: Vec<SidecarError>,

@@ -8,6 +8,7 @@ mod node;
 mod patch;
 mod punctual;
 mod receiver;
+mod split;
 mod tree;
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Patches: emitting triangles that receivers see as one light.
 
 use super::cluster::Cluster;
-use super::tree::{split, union};
+use super::split::{split, union};
 use crate::math::Vec3;
 use std::ops::Range;
 

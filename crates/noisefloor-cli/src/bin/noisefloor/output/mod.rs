@@ -196,8 +196,7 @@ impl Output {
         write_csv(self.path("stops.csv"), tiles.iter().map(TileState::row))?;
         write_csv(self.path("timeline.csv"), self.timeline.iter())?;
         // The report goes before a checkpoint is removed: whatever is killed in between, one of them says
-        // how far the render is A render whose pictures are not all there is not done, however its tiles
-        // stand
+        // how far the render is. While a picture is missing, the render is not done, even if all tiles are
         let done = over.is_some() && session.is_done() && tiles.iter().all(TileState::is_final);
         let job = checkpoint.as_ref().map(Checkpoint::job_digest);
         let kept = checkpoint.filter(|_| !done);
