@@ -245,9 +245,9 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await shot(page, "explore-large");
 
   // Retrain, with progress, scores before and after, and the new model in use
-  await focus(/^retrain/);
+  await focus(/^retrain/, "Shift+Tab");
   await page.keyboard.press("Enter");
-  await page.locator("#progress").waitFor({ timeout: 9000 }).catch(async () => { console.log(await page.evaluate(() => [document.hasFocus(), document.activeElement.id, document.querySelector("#outcome").textContent, document.querySelector("[role=alert]").textContent, document.querySelector("#retrain").disabled, document.querySelector("#working").hidden].join("|"))); });
+  await page.locator("#progress").waitFor();
   await shot(page, "explore-working");
   await page.getByText("People of the table").waitFor({ timeout: 120000 });
   await accessible(page, "learned");

@@ -3,6 +3,7 @@
 import { describe, test } from "node:test";
 import assert from "node:assert/strict";
 import {
+  FIREFOX,
   LARGE,
   SIDE_BY_SIDE,
   SMALL,
@@ -291,12 +292,17 @@ describe("the pages of a study", SIDE_BY_SIDE, () => {
     await page.getByText("The window is too small").waitFor();
     await page.setViewportSize(LARGE);
     await heading(page, "Before you begin");
-    await page.emulateMedia({ forcedColors: "active" });
-    await page.getByText("high contrast").waitFor();
-    await accessible(page, "covered");
-    await shot(page, "large-high-contrast");
-    await page.emulateMedia({ forcedColors: "none" });
+    // Firefox takes no colours from its driver
+    if (!FIREFOX) {
+      await page.emulateMedia({ forcedColors: "active" });
+      await page.getByText("high contrast").waitFor();
+      await accessible(page, "covered");
+      await shot(page, "large-high-contrast");
+      await page.emulateMedia({ forcedColors: "none" });
+    }
     await page.getByLabel("I have read this").check();
+    // Nor does it do without the mouse in one window
+    if (FIREFOX) return;
     const phone = await open(
       t,
       VALIDATION,
