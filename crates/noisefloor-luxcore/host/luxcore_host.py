@@ -43,6 +43,8 @@ OWN = ["film.filter.", "path.clamping.", "sampler.random.adaptive.", "sampler.so
 # Samples per pixel between two looks at the noise, and before the first: LuxCore's own step is 64, which is more than many
 # pictures need
 HALT_STEP = 16
+# Most samples per pixel of a picture that nobody has bounded
+MOST_SPP = 16384
 SIDES = ["x", "y", "width", "height"]
 # Most seconds between two looks at how far a session is
 POLL = 0.01
@@ -119,7 +121,7 @@ class LuxCore:
             "batch.haltthreshold": threshold,
             "batch.haltthreshold.step": HALT_STEP,
             "batch.haltthreshold.warmup": HALT_STEP,
-            "batch.haltspp": samples or 0,
+            "batch.haltspp": samples or MOST_SPP,
             "film.noiseestimation.step": HALT_STEP,
             "film.noiseestimation.warmup": HALT_STEP,
             "renderengine.seed": seed,

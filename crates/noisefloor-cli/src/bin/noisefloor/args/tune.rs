@@ -52,8 +52,8 @@ pub struct TuneArgs {
     /// Where it ends: the finest threshold, or the most samples [default: 0.001, or 16384].
     #[arg(long, value_name = "SETTING")]
     to: Option<f64>,
-    /// With a threshold: the most samples per pixel of one picture, whatever the threshold [default: what the
-    /// scene says; for a program 16384].
+    /// With a threshold: the most samples per pixel of one picture, whatever the threshold [default: what
+    /// Blender's scene says; for LuxCore and programs 16384].
     #[arg(long, value_name = "SPP")]
     max_spp: Option<u64>,
     /// Judge the picture that this denoiser makes of the samples: `oidn`, Open Image Denoise (`noisefloor doctor
