@@ -336,7 +336,7 @@ fn what_cannot_be_shown_is_an_error() {
 
     let flat = moved([1.0, 0.0, 1.0], 0.5, [0.0; 3]);
     assert_eq!(b.instance(object, rows(&flat)), Err(SceneError::Singular));
-    let far = moved([1.0; 3], 0.5, [2e6, 0.0, 0.0]);
+    let far = moved([1.0; 3], 0.5, [2e8, 0.0, 0.0]);
     assert!(matches!(b.instance(object, rows(&far)), Err(SceneError::Range { .. })));
     let nan = [[f64::NAN; 4]; 3];
     assert!(matches!(b.instance(object, nan), Err(SceneError::NotFinite { .. })));
