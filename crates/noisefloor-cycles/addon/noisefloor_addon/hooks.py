@@ -82,10 +82,12 @@ def draw(engine, context, depsgraph):
 
 def render(engine, depsgraph):
     if not wanted(engine, depsgraph):
+        if not state.wanted or engine.is_preview:
+            return original["render"](engine, depsgraph)
         # Cycles frees what it has evaluated
         layer = depsgraph.view_layer_eval.name
         original["render"](engine, depsgraph)
-        if state.wanted and not engine.is_preview and not engine.test_break():
+        if not engine.test_break():
             result = engine.get_result()
             size = result.resolution_x, result.resolution_y
             pictures = passes.read(engine, layer, size)

@@ -57,7 +57,8 @@ class Search:
         self.borrowed = [(group, name, getattr(group, name)) for group, name, _ in wanted]
         for group, name, value in wanted:
             setattr(group, name, value)
-        hooks.state.wanted = True
+        # A render that was stopped may have left some
+        hooks.state.wanted, hooks.state.rendered = True, {}
         self.begun = time.monotonic()
 
     def give_back(self):
