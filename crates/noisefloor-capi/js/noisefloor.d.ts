@@ -101,6 +101,8 @@ export interface SessionOptions {
   toneMapping?: ToneMapping;
   /** Whether neighbouring pixels have noise in common, as with a pixel filter: no warning says so then. */
   sharedPixels?: boolean;
+  /** Gets each warning once, in `judge`: what is likely wrong with the samples. Unless given, the console does. */
+  onWarning?: (text: string) => void;
 }
 
 /** A rectangle of pixels that stops as a whole. Tiles lie in rows from the top left. */
@@ -179,7 +181,7 @@ export class Session {
   push(pixels: ArrayLike<number>, batch: Layout & { spp: number }): void;
   /** Adds what is new in the mean of all `spp` samples per pixel so far. */
   pushRunning(pixels: ArrayLike<number>, batch: Layout & { spp: number }): void;
-  /** Judges the tiles that are due, and returns those that are now done. */
+  /** Judges the tiles that are due, and returns those that are now done; hands over new warnings. */
   judge(): TileState[];
   /** Where all tiles stand. */
   states(): TileState[];

@@ -372,7 +372,9 @@ export class Session {
   #handle = 0;
   #broken = null;
   #tiles;
-  #done = new Set();
+  #told = 0;
+  #onWarning;
+  #done = new Map();
 
   static async open(width, height, options) {
     await load();
@@ -382,6 +384,7 @@ export class Session {
   constructor(width, height, options = {}) {
     this.width = width;
     this.height = height;
+    this.#onWarning = options.onWarning ?? ((text) => console.warn(`noisefloor: ${text}`));
     const size = [Number(whole(width, "width", 2 ** 32)), Number(whole(height, "height", 2 ** 32))];
     const shape = STRUCTS.NfParams;
     this.#handle = withOracle(options.people ?? PEOPLE, (oracle) =>
@@ -524,9 +527,17 @@ export class Session {
 
   judge() {
     this.#call("nf_session_judge", 0);
-    const fresh = this.stops().filter((stop) => !this.#done.has(stop.tile.index));
-    for (const stop of fresh) this.#done.add(stop.tile.index);
+    // A tile can be open again, when the exposure moves, and be done a second time
+    const stops = this.stops();
+    const fresh = stops.filter(({ tile, spp }) => this.#done.get(tile.index) !== spp);
+    this.#remember(stops);
+    const warnings = this.warnings();
+    for (; this.#told < warnings.length; this.#told++) this.#onWarning(warnings[this.#told]);
     return fresh;
+  }
+
+  #remember(stops) {
+    this.#done = new Map(stops.map(({ tile, spp }) => [tile.index, spp]));
   }
 
   states() {
@@ -604,6 +615,7 @@ export class Session {
     withText(job, (job) =>
       withBytes(checkpoint, (at) => this.#call("nf_session_restore", job, at, checkpoint.length)),
     );
-    this.#done = new Set(this.stops().map((stop) => stop.tile.index));
+    this.#remember(this.stops());
+    this.#told = 0;
   }
 }

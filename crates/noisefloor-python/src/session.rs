@@ -9,7 +9,7 @@ use crate::pool;
 use crate::verdicts::{PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{
     Checkpoint, Oracle, Params, Rgb, Session, StopReason, Tile, TileGrid, checkpoint::CheckpointError,
-    session::Interruption, source::PixelNoise,
+    session::Interruption, session::SessionError, source::PixelNoise,
 };
 use noisefloor_image::{WriteError, write_atomic};
 use numpy::{PyArray2, PyArray3};
@@ -201,12 +201,12 @@ impl PySession {
     /// exposure of the finished picture turns out to be another than was estimated, tiles that were done
     /// can be open again: render until done is true.
     ///
-    /// Warns of samples that are likely to be wrong, each kind once. Raises FaultError if they cannot be what
+    /// Warns of samples that are likely to be wrong, each kind once, and after resume() once more. Raises FaultError if they cannot be what
     /// they are said to be: no tile is done then. Raises CriterionError if the model cannot judge these tiles.
     fn judge(&self, py: Python<'_>) -> PyResult<Vec<PyStop>> {
-        let judge = |session: &mut Session<Oracle>| {
-            let known = session.warnings().len();
-            session.judge().map(|stops| (stops, session.warnings()[known..].to_vec()))
+        let judge = |session: &mut Session<Oracle>| -> Result<_, SessionError> {
+            let stops = session.judge()?;
+            Ok((stops, session.new_warnings()))
         };
         let (stops, warnings) = self.detached(py, judge)?.map_err(Raise::raise)?;
         for warning in warnings {

@@ -283,6 +283,13 @@ class Faults(unittest.TestCase):
             session = self.feed(8, blurred)
         self.assertEqual(len(caught.warnings), 1)
         self.assertEqual(len(session.warnings), 1)
+        # Who resumes it may not have heard
+        with tempfile.TemporaryDirectory() as folder:
+            session.save(pathlib.Path(folder) / "checkpoint", "a job")
+            resumed = self.session()
+            resumed.resume(pathlib.Path(folder) / "checkpoint", "a job")
+        with self.assertWarnsRegex(UserWarning, "neighbouring pixels"):
+            resumed.judge()
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             shared = self.session(shared_pixels=True)

@@ -76,6 +76,25 @@ test("a picture is rendered until all tiles are done", () => {
   assert.match(version(), /^\d+\.\d+\.\d+/);
 });
 
+test("a tile that is open again is reported a second time", () => {
+  // Its exposure moves when the last tile of the picture turns dark
+  const session = new Session(160, 32, { tile: 32, maxSpp: 400, onWarning() {} });
+  const [random, stops] = [noise(7), []];
+  while (!session.isDone) {
+    for (const { tile, first, spp } of session.requests()) {
+      const [level, sigma] = tile.index < 4 ? [0.05, 0.01] : [first < 80 ? 0.5 : 0.01, 1];
+      const pixel = () => level + (sigma * random()) / Math.sqrt(spp);
+      session.push(Float32Array.from({ length: 3 * 32 * 32 }, pixel), { spp, tile });
+    }
+    stops.push(...session.judge());
+  }
+  const first = stops.filter(({ tile }) => tile.index === 0).map(({ spp }) => spp);
+  assert.equal(first.length, 2);
+  assert.ok(first[0] < 80 && first[1] > first[0], `${first}`);
+  assert.equal(session.stops()[0].spp, first[1]);
+  session.close();
+});
+
 /** The same picture in every shape that renderers have. */
 test("pixels may lie in any way", () => {
   const [width, height] = [50, 50];
@@ -200,7 +219,9 @@ test("a mean that was blended sample by sample is as good as batches", () => {
 
 test("what is likely wrong is a warning", () => {
   const warnings = (sharedPixels) => {
-    const session = new Session(128, 128, { tile: 64, sharedPixels });
+    const told = [];
+    const onWarning = (text) => told.push(text);
+    const session = new Session(128, 128, { tile: 64, sharedPixels, onWarning });
     const random = noise(9);
     for (let i = 0; i < 6; i++) {
       // A filter of three pixels, along rows
@@ -211,11 +232,33 @@ test("what is likely wrong is a warning", () => {
     }
     const said = session.warnings();
     assert.equal(session.sampleCounts().warnings, said.length);
+    assert.deepEqual(told, said, "each once");
+    // A resumed session says all again, since its user has heard none
+    session.resume("filter", session.checkpoint("filter"));
+    session.judge();
+    assert.deepEqual(told, [...said, ...said]);
     session.close();
     return said;
   };
   assert.match(warnings(false).join(), /neighbouring pixels/);
   assert.deepEqual(warnings(true), []);
+});
+
+test("types name all that is exported, and no more", async () => {
+  const types = readFileSync(new URL("../noisefloor.d.ts", import.meta.url), "utf8");
+  const named = [...types.matchAll(/^export (?:function|class|const) (\w+)/gm)].map(([, name]) => name);
+  // The layout of C, which the test below needs
+  const inner = ["REASONS", "SCHEDULES", "STATUS", "STRUCTS"];
+  const exported = Object.keys(await import("../noisefloor.js"));
+  assert.deepEqual([...named, ...inner].sort(), exported.sort());
+  // What a session has, and nothing that it lacks
+  const [, body] = /^export class Session \{([^]*?)^\}/m.exec(types);
+  const members = [...body.matchAll(/^  (?!static|constructor)(?:readonly )?(\w+)[(:]/gm)].map(([, name]) => name);
+  const session = new Session(32, 32);
+  for (const name of members) assert.ok(name in session, name);
+  const own = Object.getOwnPropertyNames(Session.prototype).filter((name) => name !== "constructor");
+  assert.deepEqual(new Set(members), new Set([...own, ...Object.keys(session)]));
+  session.close();
 });
 
 test("errors have the words of Rust", () => {
