@@ -110,6 +110,106 @@ fn a_program_s_own_threshold_is_found() {
     assert_eq!((code, report.unwrap()["ending"].as_str()), (Some(1), Some("at-finest")));
 }
 
+/// A sequence whose second frame is the hardest: its program draws noise in proportion to the threshold and to what the
+/// frame is. It writes down what it was asked for.
+#[test]
+fn a_setting_for_a_sequence_is_that_of_its_hardest_frame() {
+    let Some(python) = require_python() else { return };
+    let folder = tempdir().unwrap();
+    let (script, asked) = (folder.path().join("render.py"), folder.path().join("asked"));
+    let program = "import array, random, sys\n\
+        threshold, seed, out, scene, asked = float(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:]\n\
+        times = float(open(scene).read())\n\
+        open(asked, 'a').write(f'{scene[-1]} {threshold}\\n')\n\
+        draw = random.Random(seed).gauss\n\
+        values = array.array('f', (draw(0.5, times * threshold) for _ in range(96 * 80) for _ in range(3)))\n\
+        open(out, 'wb').write(b'PF\\n96 80\\n-1\\n' + values.tobytes())\n";
+    std::fs::write(&script, program).unwrap();
+    let times = [1.0, 2.5, 0.5];
+    for (frame, times) in (1..).zip(times) {
+        std::fs::write(folder.path().join(format!("shot{frame}")), times.to_string()).unwrap();
+    }
+    let source = format!(
+        "command: {} {} {{threshold}} {{seed}} {{out}}.pfm {{scene}} {}",
+        text(&python),
+        script.display(),
+        asked.display()
+    );
+    let scene = folder.path().join("shot{frame}");
+    let keep = folder.path().join("kept");
+    let search = |scene: &str, more: &[&str]| {
+        let args = ["tune", scene, "--source", &source, "--tone-mapping", "srgb", "--from", "0.02", "--json"];
+        let answer = succeed(&[&args, more].concat());
+        serde_json::from_str::<Value>(&answer).unwrap()
+    };
+    let all = search(text(&scene), &["--frames", "1,2,3", "--keep", text(&keep)]);
+    let order: Vec<u64> =
+        all["frames"].as_array().unwrap().iter().map(|frame| frame.as_u64().unwrap()).collect();
+    assert_eq!(order, [2, 1, 3], "{all}");
+    assert!(all["steps"].as_array().unwrap().iter().all(|step| step["frame"] == 2), "{all}");
+    // What its second frame alone needs, with the seed that it has in the sequence
+    let alone = search(text(&scene), &["--frames", "2"]);
+    assert_eq!(all["setting"], alone["setting"]);
+
+    // The coarsest setting is tried in all, the others in the hardest until it passes, and then in all
+    let log = std::fs::read_to_string(&asked).unwrap();
+    let steps = all["steps"].as_array().unwrap().len();
+    let pairs = log.lines().count() / 2 - alone["steps"].as_array().unwrap().len();
+    assert_eq!(pairs, 3 + (steps - 2) + 3, "{log}");
+
+    // A search that was cut goes on where it was, by the order that it had
+    let report = keep.join("tune.json");
+    let mut cut = json(&report);
+    cut["steps"].as_array_mut().unwrap().pop();
+    std::fs::write(&report, cut.to_string()).unwrap();
+    std::fs::write(&asked, "").unwrap();
+    let again = search(text(&scene), &["--frames", "1,2,3", "--keep", text(&keep), "--resume"]);
+    assert_eq!(again["setting"], all["setting"]);
+    assert_eq!(std::fs::read_to_string(&asked).unwrap().lines().count(), 2 * 3);
+    assert_eq!(json(&report)["setting"], all["setting"]);
+    // One that is done renders nothing
+    std::fs::write(&asked, "").unwrap();
+    let done = search(text(&scene), &["--frames", "1,2,3", "--keep", text(&keep), "--resume"]);
+    assert_eq!(done["setting"], all["setting"]);
+    assert_eq!(std::fs::read_to_string(&asked).unwrap(), "");
+    // And another is not it
+    let base = [
+        "tune",
+        text(&scene),
+        "--source",
+        &source,
+        "--tone-mapping",
+        "srgb",
+        "--keep",
+        text(&keep),
+        "--resume",
+    ];
+    fail(&[&base[..], &["--frames", "1,2,3", "--seed", "9"]].concat(), &["cannot be resumed", "--force"]);
+    fail(&[&base[..], &["--frames", "1,2"]].concat(), &["other frames", "--force"]);
+    fail(&[&base[..], &["--frames", "1,2,1"]].concat(), &["frame 1 twice"]);
+    fail(&["tune", "cornell-box", "--frames", "1,2"], &["{frame}"]);
+    std::fs::write(folder.path().join("shot3"), "0.6").unwrap();
+    fail(&[&base[..], &["--frames", "1,2,3"]].concat(), &["shot3", "has changed"]);
+}
+
+/// Samples grow from nothing again, to the same pictures.
+#[test]
+fn a_search_for_samples_is_resumed() {
+    let folder = tempdir().unwrap();
+    let keep = folder.path().join("kept");
+    let args = ["tune", "cornell-box", "--size", "64x64", "--quiet", "--keep", text(&keep)];
+    let setting = succeed(&args);
+    let report = keep.join("tune.json");
+    let mut cut = json(&report);
+    cut["steps"].as_array_mut().unwrap().pop();
+    std::fs::write(&report, cut.to_string()).unwrap();
+    assert_eq!(succeed(&[&args[..], &["--resume"]].concat()), setting);
+    let steps = |value: &Value| {
+        value["steps"].as_array().unwrap().iter().map(|s| s["ratio"].clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(steps(&json(&report))[..steps(&cut).len()], steps(&cut));
+}
+
 #[test]
 fn what_cannot_be_tuned_is_refused() {
     fail(

@@ -37,6 +37,7 @@ use std::path::PathBuf;
   noisefloor tune shot.blend --source cycles --denoise oidn   for a picture that will be denoised
   noisefloor tune shot.blend --source cycles --tone-mapping lut:agx.cube --lut-input log2:-10,6.5
   noisefloor tune hall/scene.xml --source mitsuba             samples per pixel
+  noisefloor tune 'walk.{frame:04}.xml' --frames 1,50,120     one setting for a sequence
   noisefloor tune --source 'command: myrender {scene} --noise {threshold} --seed {seed} -o {out}.exr' hall.ass
   noisefloor tune cornell-box --size 192x192 --keep out/tuned --json")]
 pub struct TuneArgs {
@@ -66,9 +67,16 @@ pub struct TuneArgs {
     /// Write the mean of the last two pictures, what is left in it, and tune.json into this folder.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
+    /// With --keep: go on with the search that was interrupted in that folder.
+    #[arg(long, requires = "keep", conflicts_with = "force")]
+    resume: bool,
     /// With --keep: overwrite what is in the folder.
     #[arg(long, requires = "keep")]
     force: bool,
+    /// Find one setting for a sequence by these of its frames: SCENE holds {frame}, or {frame:04} for four digits.
+    /// All are rendered with the first setting, then the worst first, until one fails.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    frames: Vec<u32>,
     /// Print JSON instead of lines.
     #[arg(long)]
     json: bool,
@@ -89,8 +97,17 @@ pub struct TuneArgs {
 
 impl TuneArgs {
     pub fn check(self) -> anyhow::Result<TuneJob> {
-        let tone = self.tone.check()?.load()?;
+        let tone = self.tone.check()?;
+        tone.load()?;
         let (source, resources) = self.renderer.check(self.scene.as_deref())?;
+        if !self.frames.is_empty() {
+            source.check_frames()?;
+            let mut twice = self.frames.clone();
+            twice.sort_unstable();
+            if let Some(pair) = twice.windows(2).find(|pair| pair[0] == pair[1]) {
+                refuse!("--frames names frame {} twice", pair[0]);
+            }
+        }
         let (adapts, name) = match &source.kind {
             SourceKind::Adapter(adapter) => (adapter.adapts, adapter.name),
             SourceKind::Command(template) => (template.contains("{threshold}"), "command"),
@@ -155,6 +172,7 @@ impl TuneArgs {
         };
         Ok(TuneJob {
             source,
+            frames: self.frames,
             resources,
             tuning,
             most_spp: self.max_spp,
@@ -163,7 +181,7 @@ impl TuneArgs {
             viewing,
             audience,
             keep: self.keep,
-            earlier: Earlier::of(self.force, false),
+            earlier: Earlier::of(self.force, self.resume),
             json: self.json,
             quiet: self.quiet,
         })

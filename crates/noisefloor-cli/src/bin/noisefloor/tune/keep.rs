@@ -1,14 +1,17 @@
 //! `tune --keep`: the picture of the last step, and what was found.
 
+use super::Row;
 use super::pictures::Judged;
 use crate::output::ERROR_SCALE;
-use noisefloor::Rgb;
+use anyhow::{Context, bail};
+use noisefloor::{Rgb, source::SourceIdentity};
 use noisefloor_cli::files::write_json;
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::refuse;
 use noisefloor_image::maps::{Canvas, NOISE_SCALE, draw_field};
 use noisefloor_image::{RenderLayers, SampleFacts, write_exr};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 const REPORT: &str = "tune.json";
@@ -17,20 +20,57 @@ const FILES: &[&str] = &[REPORT, "image.exr", "image.png", "report.json"];
 /// The folder.
 pub struct Keep(Folder);
 
+/// What tune.json says of an earlier search.
+#[derive(Deserialize)]
+pub struct KeptSearch {
+    identity: Vec<SourceIdentity>,
+    #[serde(default)]
+    pub frames: Vec<u32>,
+    pub steps: Vec<Row>,
+}
+
 impl Keep {
     pub fn claim(path: PathBuf, earlier: Earlier) -> anyhow::Result<Self> {
         let folder = Folder::claim(path)?;
         if let (Earlier::Keep, Some(file)) = (earlier, folder.first_of(FILES)) {
             refuse!(
-                "{}: holds {file} of an earlier run; --force overwrites it, --keep names another folder",
+                "{}: holds {file} of an earlier run; --resume goes on with a search, --force overwrites it, --keep \
+                 names another folder",
                 folder.path().display()
             );
         }
         Ok(Self(folder))
     }
 
-    /// Writes the pictures of a step, and what was found up to it.
-    pub fn write(&self, judged: &Judged, report: &impl Serialize) -> anyhow::Result<()> {
+    /// The search that is resumed, if there is one.
+    pub fn earlier(&self, identity: &[SourceIdentity]) -> anyhow::Result<Option<KeptSearch>> {
+        let path = self.0.path().join(REPORT);
+        let report = match std::fs::read(&path) {
+            Ok(report) => report,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(error).with_context(|| path.display().to_string()),
+        };
+        let kept: KeptSearch = serde_json::from_slice(&report)
+            .with_context(|| format!("{}: no search that can be resumed", path.display()))?;
+        if kept.identity.len() != identity.len() {
+            bail!("{}: the search is of other frames; --force begins anew", path.display());
+        }
+        // Frames are in the order in which they were typed
+        if let Some(change) =
+            identity.iter().zip(&kept.identity).find_map(|(now, kept)| now.change_since(kept))
+        {
+            bail!("{}: the search cannot be resumed: {change}; --force begins anew", path.display());
+        }
+        Ok(Some(kept))
+    }
+
+    /// Writes what was found so far.
+    pub fn write_report(&self, report: &impl Serialize) -> anyhow::Result<()> {
+        write_json(&self.0.path().join(REPORT), report)
+    }
+
+    /// Writes the pictures of a step.
+    pub fn write_pictures(&self, judged: &Judged) -> anyhow::Result<()> {
         let path = |name: &str| self.0.path().join(name);
         let Judged { size: (width, height), mean, denoised, display, map, spp, .. } = judged;
         let spp = spp.map(|spp| spp as u64);
@@ -42,7 +82,7 @@ impl Keep {
             Canvas::of_picture(*width, &encoded)
         };
         shown(mean).save(path("image.png"))?;
-        match denoised {
+        Ok(match denoised {
             Some(denoised) => {
                 write_exr(path("image-denoised.exr"), &RenderLayers::rgb(*width, *height, denoised))?;
                 let shown = shown(denoised);
@@ -50,7 +90,6 @@ impl Keep {
                 draw_field(&shown, map, &ERROR_SCALE).save(path("denoised-error.png"))?;
             }
             None => draw_field(&shown(mean), map, &NOISE_SCALE).save(path("noise.png"))?,
-        }
-        write_json(&path(REPORT), report)
+        })
     }
 }

@@ -4,16 +4,18 @@ mod keep;
 mod pictures;
 
 use crate::tune::keep::Keep;
-use crate::tune::pictures::{Judged, Judges, Pictures};
+use crate::tune::pictures::{Judged, Judges, View};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
-use noisefloor::tune::{Ending, Knob, Next, Tuning};
-use noisefloor::{Audience, Oracle, Params, ToneMapping, Viewing};
+use noisefloor::source::SourceIdentity;
+use noisefloor::tune::{Ending, Excess, Knob, Next, Tuning};
+use noisefloor::{Audience, Oracle, Params, Viewing};
 use noisefloor_cli::folder::Earlier;
+use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::{note, say, say_json};
 use noisefloor_cli::signals::end_on_signal;
 use noisefloor_cli::sources::{Resources, SourceJob};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -21,12 +23,14 @@ use std::time::{Duration, Instant};
 /// A setting to find: checked.
 pub struct TuneJob {
     pub source: SourceJob,
+    /// The frames of a sequence that are looked at; none if it is one picture.
+    pub frames: Vec<u32>,
     pub resources: Resources,
     pub tuning: Tuning,
     /// Most samples per pixel of a picture with a threshold.
     pub most_spp: Option<u64>,
     pub criterion: TuneCriterion,
-    pub tone: ToneMapping,
+    pub tone: Tone,
     pub viewing: Viewing,
     pub audience: Audience,
     pub keep: Option<PathBuf>,
@@ -53,7 +57,7 @@ pub enum KnobChoice {
 }
 
 /// One line of the search.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Row {
     /// One picture with it is as good as the mean of the two.
     setting: f64,
@@ -61,9 +65,13 @@ struct Row {
     each: f64,
     /// What is wrong in the worst place, over what may be; null where it cannot be told.
     ratio: Option<f64>,
-    /// The worst place.
+    /// The worst place, and the frame of a sequence that has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    frame: Option<u32>,
     x: Option<usize>,
     y: Option<usize>,
+    /// Follows from the pictures, so that equal ones are known ([`Excess::pictures`]).
+    pictures: u64,
     /// For both pictures, and what judging them took.
     seconds: f64,
     judging_seconds: f64,
@@ -79,60 +87,179 @@ struct Report {
     too_coarse: Option<f64>,
     ending: &'static str,
     judged: String,
+    /// The frames of a sequence, worst first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    frames: Vec<u32>,
     steps: Vec<Row>,
     seconds: f64,
+    /// What the search depends on: it is resumed only by the same.
+    identity: Vec<SourceIdentity>,
 }
 
 pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
     job.resources.start_threads()?;
-    end_on_signal("stopped; what was found so far stands above")?;
+    end_on_signal(match job.keep {
+        Some(_) => "stopped; --resume goes on from what was found so far",
+        None => "stopped; what was found so far stands above",
+    })?;
     let keep = job.keep.take().map(|folder| Keep::claim(folder, job.earlier)).transpose()?;
-    let began = Instant::now();
-    let mut params = Params::default().with_viewing(job.viewing).with_tone_mapping(job.tone).with_tile(TILE);
-    params.audience = job.audience;
-    let mut pictures = Pictures::open(&job.source, job.resources, job.tuning.knob(), job.most_spp)?;
-    let mut judges = Judges::begin(&job.criterion, params, &mut pictures, job.resources.timeout)?;
-    let mut rows = Vec::new();
-    let mut last: Option<Judged> = None;
+    let mut search = Search::begin(&job)?;
+    if let (Some(keep), Earlier::Resume) = (&keep, job.earlier) {
+        search.resume(keep, &job)?;
+    }
     let ending = loop {
-        let (each, setting) = match job.tuning.next() {
+        let (each, setting) = match search.tuning.next() {
             Next::Done(ending) => break ending,
             Next::Render { each, setting } => (each, setting),
         };
-        let bar = spinner(job.quiet, format!("{} {setting}: two pictures", name(job.tuning.knob())));
-        let start = Instant::now();
-        let pair = pictures.pair(each, &bar)?;
-        let rendered = start.elapsed();
-        bar.set_message(format!("{} {setting}: judging", name(job.tuning.knob())));
-        let judged = judges.judge(pair)?;
-        bar.finish_and_clear();
-        let excess = judged.excess;
-        job.tuning.tell(excess);
-        let row = Row {
-            setting,
-            each,
-            ratio: excess.ratio.is_finite().then_some(excess.ratio),
-            x: excess.place.map(|(x, _)| x),
-            y: excess.place.map(|(_, y)| y),
-            seconds: rendered.as_secs_f64(),
-            judging_seconds: (start.elapsed() - rendered).as_secs_f64(),
-        };
+        let (row, judged) = search.step(&job, each, setting)?;
         if !job.quiet && !job.json {
             say_step(&job, &row)?;
         }
-        rows.push(row);
-        last = Some(judged);
-        if let (Some(keep), Some(last)) = (&keep, &last) {
-            keep.write(last, &report(&job, &judges, None, &rows, began.elapsed()))?;
+        search.rows.push(row);
+        if let Some(keep) = &keep {
+            keep.write_pictures(&judged)?;
+            keep.write_report(&search.report(None))?;
         }
     };
-    let report = report(&job, &judges, Some(ending), &rows, began.elapsed());
-    if let (Some(keep), Some(last)) = (&keep, &last) {
-        keep.write(last, &report)?;
+    let report = search.report(Some(ending));
+    if let Some(keep) = &keep {
+        keep.write_report(&report)?;
     }
     say_all(&job, &report, ending)?;
-    pictures.notes().iter().for_each(|line| note!("note: {line}"));
+    search.views.iter().flat_map(View::notes).for_each(|line| note!("note: {line}"));
     Ok(if matches!(ending, Ending::Found { .. }) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// A search in progress.
+struct Search<'a> {
+    tuning: Tuning,
+    /// One, or the frames of a sequence, worst first.
+    views: Vec<View>,
+    judges: Judges<'a>,
+    identity: Vec<SourceIdentity>,
+    rows: Vec<Row>,
+}
+
+impl<'a> Search<'a> {
+    fn begin(job: &'a TuneJob) -> anyhow::Result<Self> {
+        let mut params = Params::default().with_viewing(job.viewing).with_tile(TILE);
+        (params.tone_mapping, params.audience) = (job.tone.load()?, job.audience);
+        let judges = Judges::begin(&job.criterion, params, job.resources.timeout)?;
+        let frames: Vec<Option<u32>> = match job.frames.as_slice() {
+            [] => vec![None],
+            frames => frames.iter().copied().map(Some).collect(),
+        };
+        let views = frames.into_iter().map(|frame| View::open(job, frame));
+        let views: Vec<View> = views.collect::<anyhow::Result<_>>()?;
+        let identity: anyhow::Result<_> = views.iter().map(|view| view.identity(job, &judges)).collect();
+        Ok(Self { tuning: job.tuning.clone(), identity: identity?, views, judges, rows: Vec::new() })
+    }
+
+    /// Takes over what an earlier search has found.
+    fn resume(&mut self, keep: &Keep, job: &TuneJob) -> anyhow::Result<()> {
+        let Some(kept) = keep.earlier(&self.identity)? else { return Ok(()) };
+        self.views.sort_by_key(|view| kept.frames.iter().position(|frame| view.frame == Some(*frame)));
+        for row in kept.steps {
+            // With another --from or --to, the search may go another way from some step on
+            if !matches!(self.tuning.next(), Next::Render { setting, .. } if setting == row.setting) {
+                break;
+            }
+            self.tuning.tell(row.excess());
+            if !job.quiet && !job.json {
+                say_step(job, &row)?;
+            }
+            self.rows.push(row);
+        }
+        Ok(())
+    }
+
+    /// Renders and judges two pictures of every frame; from the second setting on, only until one fails, in the order
+    /// in which they were hard. Of the worst, what is found.
+    fn step(&mut self, job: &TuneJob, each: f64, setting: f64) -> anyhow::Result<(Row, Judged)> {
+        let (mut rendering, mut judging) = (Duration::ZERO, Duration::ZERO);
+        let mut found: Vec<(usize, Judged)> = Vec::new();
+        for (place, view) in self.views.iter_mut().enumerate() {
+            let what = match view.frame {
+                Some(frame) => format!("{} {setting}, frame {frame}", name(job.tuning.knob())),
+                None => format!("{} {setting}", name(job.tuning.knob())),
+            };
+            let bar = spinner(job.quiet, format!("{what}: two pictures"));
+            let start = Instant::now();
+            let pair = view.pictures.pair(each, &bar)?;
+            rendering += start.elapsed();
+            bar.set_message(format!("{what}: judging"));
+            let start = Instant::now();
+            let judged = self.judges.judge(pair, view.guides.as_ref())?;
+            judging += start.elapsed();
+            bar.finish_and_clear();
+            let fails = judged.excess.ratio > 1.0;
+            found.push((place, judged));
+            if fails && !self.rows.is_empty() {
+                break;
+            }
+        }
+        found.sort_by(|(_, a), (_, b)| b.excess.ratio.total_cmp(&a.excess.ratio));
+        let frame = self.views[found[0].0].frame;
+        if self.rows.is_empty() {
+            let place =
+                |view: &View| found.iter().position(|(place, _)| self.views[*place].frame == view.frame);
+            let order: Vec<Option<usize>> = self.views.iter().map(place).collect();
+            let mut views: Vec<_> = order.into_iter().zip(std::mem::take(&mut self.views)).collect();
+            views.sort_by_key(|(place, _)| *place);
+            self.views = views.into_iter().map(|(_, view)| view).collect();
+        } else {
+            self.views[..=found[0].0].rotate_right(1);
+        }
+        let (_, worst) = found.swap_remove(0);
+        self.tuning.tell(worst.excess);
+        let Excess { ratio, place, pictures } = worst.excess;
+        let row = Row {
+            setting,
+            each,
+            ratio: ratio.is_finite().then_some(ratio),
+            frame,
+            x: place.map(|(x, _)| x),
+            y: place.map(|(_, y)| y),
+            pictures,
+            seconds: rendering.as_secs_f64(),
+            judging_seconds: judging.as_secs_f64(),
+        };
+        Ok((row, worst))
+    }
+
+    fn report(&self, ending: Option<Ending>) -> Report {
+        let (setting, enough, too_coarse) = match ending {
+            Some(Ending::Found { setting, enough, too_coarse }) => (Some(setting), Some(enough), too_coarse),
+            _ => (None, None, None),
+        };
+        let ending = match ending {
+            None => "searching",
+            Some(Ending::Found { .. }) => "found",
+            Some(Ending::AtFinest { .. }) => "at-finest",
+            Some(Ending::Unchanged) => "unchanged",
+            Some(Ending::NotFalling { .. }) => "not-falling",
+        };
+        Report {
+            knob: name(self.tuning.knob()),
+            setting,
+            enough,
+            too_coarse,
+            ending,
+            judged: self.judges.said(),
+            frames: self.views.iter().filter_map(|view| view.frame).collect(),
+            steps: self.rows.clone(),
+            seconds: self.rows.iter().map(|row| row.seconds + row.judging_seconds).sum(),
+            identity: self.identity.clone(),
+        }
+    }
+}
+
+impl Row {
+    fn excess(&self) -> Excess {
+        let ratio = self.ratio.unwrap_or(f64::INFINITY);
+        Excess { place: self.x.zip(self.y), pictures: self.pictures, ..Excess::new(ratio) }
+    }
 }
 
 /// Edge of the tiles in which noise is described: windows are what is judged, whatever the tiles.
@@ -142,36 +269,6 @@ fn name(knob: Knob) -> &'static str {
     match knob {
         Knob::Samples { .. } => "samples",
         Knob::Threshold { .. } => "threshold",
-    }
-}
-
-fn report(
-    job: &TuneJob,
-    judges: &Judges<'_>,
-    ending: Option<Ending>,
-    rows: &[Row],
-    took: Duration,
-) -> Report {
-    let (setting, enough, too_coarse) = match ending {
-        Some(Ending::Found { setting, enough, too_coarse }) => (Some(setting), Some(enough), too_coarse),
-        _ => (None, None, None),
-    };
-    let ending = match ending {
-        None => "searching",
-        Some(Ending::Found { .. }) => "found",
-        Some(Ending::AtFinest { .. }) => "at-finest",
-        Some(Ending::Unchanged) => "unchanged",
-        Some(Ending::NotFalling { .. }) => "not-falling",
-    };
-    Report {
-        knob: name(job.tuning.knob()),
-        setting,
-        enough,
-        too_coarse,
-        ending,
-        judged: judges.said(),
-        steps: rows.to_vec(),
-        seconds: took.as_secs_f64(),
     }
 }
 
@@ -188,10 +285,13 @@ fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
             format!("the denoised picture has lost {:.3} JOD, {lost} are allowed", ratio * lost)
         }
     };
-    let at = match (row.x, row.y) {
+    let mut at = match (row.x, row.y) {
         (Some(x), Some(y)) => format!(" around ({x}, {y})"),
         _ => String::new(),
     };
+    if let Some(frame) = row.frame {
+        at = format!("{at} in frame {frame}");
+    }
     let name = name(job.tuning.knob());
     Ok(say!("{name} {}: {what}, at worst{at}; {:.1} s", row.setting, row.seconds + row.judging_seconds)?)
 }
@@ -231,8 +331,8 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
     }
     if matches!(ending, Ending::Found { .. }) {
         let last: f64 = report.steps.last().map_or(0.0, |step| step.seconds);
-        let all: f64 = report.steps.iter().map(|step| step.seconds + step.judging_seconds).sum();
-        say!("{}; {:.0} s, of which the last two pictures took {last:.0} s", report.judged, all)?;
+        let pictures = if report.frames.len() > 1 { "the last pictures" } else { "the last two pictures" };
+        say!("{}; {:.0} s, of which {pictures} took {last:.0} s", report.judged, report.seconds)?;
     }
     Ok(())
 }

@@ -1,16 +1,18 @@
 //! Two pictures of a setting, and how far they are from what may be seen.
 
-use super::TuneCriterion;
+use super::{TuneCriterion, TuneJob, name};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::source::FirstHits;
+use noisefloor::source::{FirstHits, SourceIdentity};
 use noisefloor::stills::StillError;
 use noisefloor::tune::{Excess, Knob, PicturePair};
-use noisefloor::{Film, Params, ProgressiveSource, Rgb, TileGrid, display::Display};
+use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, TileGrid, display::Display};
+use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::{FIRST_HITS_SPP, Opened, Resources, Source, SourceJob, SourceKind};
 use noisefloor_denoise::{DenoisedError, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
 use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
+use std::fs::File;
 use std::time::Duration;
 
 /// Samples per pixel between two looks at the signals.
@@ -51,13 +53,65 @@ pub struct Judged {
     pub spp: Option<f64>,
 }
 
+/// One picture that is rendered again and again: the only one, or a frame of a sequence.
+pub struct View {
+    pub frame: Option<u32>,
+    /// What it is rendered from.
+    source: SourceJob,
+    pub pictures: Pictures,
+    /// Albedo and normals for the denoiser, of each half.
+    pub guides: Option<[FirstHits; 2]>,
+}
+
+impl View {
+    pub fn open(job: &TuneJob, frame: Option<u32>) -> anyhow::Result<Self> {
+        let source = frame.map_or_else(|| job.source.clone(), |frame| job.source.of_frame(frame));
+        let mut pictures = Pictures::open(&source, job.resources, job.tuning.knob(), job.most_spp)?;
+        let guides = match job.criterion {
+            TuneCriterion::Noise(_) => None,
+            TuneCriterion::Denoised { .. } => pictures.guides()?,
+        };
+        Ok(Self { frame, source, pictures, guides })
+    }
+
+    /// What the pictures and what is found in them depend on.
+    pub fn identity(&self, job: &TuneJob, judges: &Judges<'_>) -> anyhow::Result<SourceIdentity> {
+        let mut identity = match &self.pictures {
+            Pictures::Samples { source, .. } | Pictures::Adaptive { source, .. } => source.identity()?,
+            Pictures::Program { .. } => {
+                let mut identity = SourceIdentity::new(serde_json::to_string(&self.source.absolute()?)?);
+                if let Some(scene) = self.source.scene.as_ref().filter(|scene| scene.is_file()) {
+                    identity.add_from(scene.display().to_string(), File::open(&**scene)?)?;
+                }
+                identity
+            }
+        };
+        if let Tone::Lut { file, .. } = &job.tone {
+            identity.add_from(file.display().to_string(), File::open(&**file)?)?;
+        }
+        let criterion = match &job.criterion {
+            TuneCriterion::Noise(oracle) => oracle.fingerprint(),
+            TuneCriterion::Denoised { .. } => String::new(),
+        };
+        let tone = serde_json::to_string(&job.tone.absolute()?)?;
+        let (knob, said, most) = (name(job.tuning.knob()), judges.said(), job.most_spp.unwrap_or(0));
+        let audience = serde_json::to_string(&job.audience)?;
+        let seeds = seeds(self.source.seed);
+        Ok(identity
+            .with_options(&format!("{knob} of {seeds:?}, {most} {said} {criterion} {audience} {tone}")))
+    }
+
+    /// What the user should know afterwards.
+    pub fn notes(&self) -> Vec<String> {
+        match &self.pictures {
+            Pictures::Samples { source, .. } | Pictures::Adaptive { source, .. } => source.notes(),
+            Pictures::Program { .. } => Vec::new(),
+        }
+    }
+}
+
 impl Pictures {
-    pub fn open(
-        job: &SourceJob,
-        resources: Resources,
-        knob: Knob,
-        most: Option<u64>,
-    ) -> anyhow::Result<Self> {
+    fn open(job: &SourceJob, resources: Resources, knob: Knob, most: Option<u64>) -> anyhow::Result<Self> {
         let seeds = seeds(job.seed);
         if let (SourceKind::Command(template), Knob::Threshold { .. }) = (&job.kind, knob) {
             let scene = job.scene.as_deref().map(Into::into);
@@ -80,14 +134,6 @@ impl Pictures {
         let (Self::Samples { source, .. } | Self::Adaptive { source, .. }) = self else { return Ok(None) };
         let Some(a) = source.first_hits(0, FIRST_HITS_SPP)? else { return Ok(None) };
         Ok(source.first_hits(1, FIRST_HITS_SPP)?.map(|b| [a, b]))
-    }
-
-    /// What the user should know afterwards.
-    pub fn notes(&self) -> Vec<String> {
-        match self {
-            Self::Samples { source, .. } | Self::Adaptive { source, .. } => source.notes(),
-            Self::Program { .. } => Vec::new(),
-        }
     }
 
     /// Two pictures, each with this setting.
@@ -164,23 +210,18 @@ fn grow(source: &mut dyn Source, film: &mut Film, each: u64, bar: &ProgressBar) 
 pub struct Judges<'a> {
     criterion: &'a TuneCriterion,
     params: Params,
-    denoiser: Option<(Oidn, Option<[FirstHits; 2]>)>,
+    denoiser: Option<Oidn>,
     /// The first pair warns.
     warned: bool,
 }
 
 impl<'a> Judges<'a> {
-    pub fn begin(
-        criterion: &'a TuneCriterion,
-        params: Params,
-        pictures: &mut Pictures,
-        timeout: Duration,
-    ) -> anyhow::Result<Self> {
+    pub fn begin(criterion: &'a TuneCriterion, params: Params, timeout: Duration) -> anyhow::Result<Self> {
         let denoiser = match criterion {
             TuneCriterion::Noise(_) => None,
             TuneCriterion::Denoised { .. } => {
                 let plan = FilterPlan { timeout, ..FilterPlan::default() };
-                Some((Oidn::start(plan)?, pictures.guides()?))
+                Some(Oidn::start(plan)?)
             }
         };
         Ok(Self { criterion, params, denoiser, warned: false })
@@ -189,7 +230,7 @@ impl<'a> Judges<'a> {
     /// What the verdict is about, in words.
     pub fn said(&self) -> String {
         match (self.criterion, &self.denoiser) {
-            (TuneCriterion::Denoised { lost }, Some((denoiser, _))) => format!(
+            (TuneCriterion::Denoised { lost }, Some(denoiser)) => format!(
                 "at most {lost} JOD lost after {}, by the vision model: nobody has been asked",
                 denoiser.name()
             ),
@@ -200,7 +241,7 @@ impl<'a> Judges<'a> {
         }
     }
 
-    pub fn judge(&mut self, pair: Pair) -> anyhow::Result<Judged> {
+    pub fn judge(&mut self, pair: Pair, guides: Option<&[FirstHits; 2]>) -> anyhow::Result<Judged> {
         let Pair { size, pictures, spp } = pair;
         let halves = PicturePair::new(size, pictures.clone(), spp.unwrap_or(128.0));
         let halves = halves.map_err(|error| match error {
@@ -218,11 +259,11 @@ impl<'a> Judges<'a> {
         let spp = spp.map(|each| 2.0 * each);
         let mean = halves.mean().to_vec();
         match (self.criterion, &mut self.denoiser) {
-            (TuneCriterion::Denoised { lost }, Some((denoiser, guides))) => {
+            (TuneCriterion::Denoised { lost }, Some(denoiser)) => {
                 let wants = denoiser.wants();
                 let guided = |pixels, half: usize| {
                     let picture = NoisyPicture::new(size, pixels);
-                    guides.as_ref().map_or(picture, |guides| picture.guided(&guides[half], wants))
+                    guides.map_or(picture, |guides| picture.guided(&guides[half], wants))
                 };
                 let noisy = [pictures[0].as_slice(), &pictures[1]];
                 let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;

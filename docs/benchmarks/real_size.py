@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+"""The oracle against uniform sampling in pictures of some size: real-size.md.
+
+    real_size.py render OUT SCENE...     renders what is missing below OUT, cheapest first; goes on where it was stopped
+    real_size.py measure OUT > rows.csv  JOD lost by the worst square of 64 pixels, by `noisefloor metrics`
+    real_size.py package OUT SCENE       the same of one scene by the PyPI package cvvdp, no code of this project
+    real_size.py table rows.csv          the tables of real-size.md
+
+Each scene is rendered by the built-in path tracer: until the oracle stops all tiles, noisy and denoised; with one number of
+samples for all pixels, which are denoised, too; and once with far more samples and another seed, as the reference.
+Seconds are of the processor, the denoiser's process included. Needs numpy, OpenEXR and pillow."""
+import argparse
+import csv
+import json
+import math
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import at_the_stop as shown  # noqa: E402
+
+UNIFORM = (32, 64, 128, 256, 512)
+EDGE = 64
+
+
+def name(scene):
+    path = pathlib.Path(scene)
+    return path.parent.name if path.suffix and path.parent.name != "pbrt" else path.parent.parent.name if path.suffix else scene
+
+
+def jobs(args):
+    """What is rendered of a scene: folder and options."""
+    oidn = ["--denoise", "oidn"]
+    yield "oracle-denoised", oidn
+    for spp in UNIFORM:
+        yield f"uniform-{spp}", [*oidn, "--min-spp", str(spp), "--max-spp", str(spp)]
+    yield "oracle", ["--max-spp", str(args.reference // 2)]
+    yield "reference", ["--criterion", f"spp:{args.reference}", "--seed", "77"]
+
+
+def render(args):
+    for scene in args.scenes:
+        for job, options in jobs(args):
+            out = pathlib.Path(args.out) / name(scene) / job
+            done = out / "processor-seconds.json"
+            if done.exists():
+                continue
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            command = [args.noisefloor, "render", scene, "--size", args.size, "--tile", "64", "--seed", "1", "--out", str(out)]
+            if "--seed" in options:
+                del command[command.index("--seed"):command.index("--seed") + 2]
+            if (out / "checkpoint.nfc").exists():
+                command.append("--resume")
+            run = subprocess.run([*command, *options], stderr=subprocess.PIPE, text=True)
+            if run.returncode:
+                print(f"{name(scene)}/{job}: {run.stderr[-400:]}", flush=True)
+                break
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            done.write_text(json.dumps({"seconds": seconds, "resumed": "--resume" in command}))
+            print(f"{name(scene)}/{job}: {seconds:.0f} s", flush=True)
+
+
+def squares(height, width):
+    """Squares side by side; the last ones lie at the edge."""
+    places = lambda side: [*range(0, max(side - EDGE, 0), EDGE), max(side - EDGE, 0)]
+    return [(x, y, x + EDGE, y + EDGE) for y in places(height) for x in places(width)]
+
+
+def pictures(folder):
+    """The reference as shown, and every other picture of a scene under its exposure, with its samples."""
+    truth, _ = shown.load(folder / "reference")
+    gain = shown.exposure(truth)
+    yield "reference", shown.shown(truth, gain), 0, 0
+    for job in sorted(folder.iterdir()):
+        seconds = job / "processor-seconds.json"
+        if job.name == "reference" or not seconds.exists():
+            continue
+        _, spp = shown.load(job)
+        cost = json.loads(seconds.read_text())["seconds"]
+        if job.name != "oracle-denoised":
+            yield job.name, shown.shown(shown.load(job)[0], gain), spp.mean(), cost
+        denoised = job / "image-denoised.exr"
+        if denoised.exists():
+            label = job.name if job.name.endswith("-denoised") else f"{job.name}-denoised"
+            yield label, shown.shown(shown.load(f"{denoised}:0")[0], gain), spp.mean(), cost
+
+
+def measure(args, lost=None):
+    rows = csv.writer(sys.stdout)
+    rows.writerow("scene picture spp seconds worst p95 median".split())
+    for folder in sorted(pathlib.Path(args.out).iterdir()):
+        if not (folder / "reference" / "processor-seconds.json").exists() or getattr(args, "scene", folder.name) != folder.name:
+            continue
+        every = pictures(folder)
+        _, truth, _, _ = next(every)
+        with tempfile.TemporaryDirectory() as scratch:
+            for label, picture, spp, seconds in every:
+                one = lost or (lambda a, b: shown.lost(args.noisefloor, a, b, scratch))
+                values = [one(picture.crop(s), truth.crop(s)) for s in squares(truth.height, truth.width)]
+                numbers = [spp, seconds, max(values), np.quantile(values, 0.95), np.median(values)]
+                rows.writerow([folder.name, label, *(f"{v:.3f}" for v in numbers)])
+                sys.stdout.flush()
+
+
+def package(args):
+    import pycvvdp
+
+    metric = pycvvdp.cvvdp(display_name="standard_fhd", quiet=True)
+    array = lambda picture: np.asarray(picture, dtype=np.float32) / 255
+    measure(args, lambda a, b: 10 - float(metric.predict(array(a), array(b), dim_order="HWC")[0]))
+
+
+def as_good(uniform, lost):
+    """Samples at which uniform sampling has lost as much: straight between two counts in logarithms. None outside."""
+    for (low, before), (high, after) in zip(uniform, uniform[1:]):
+        if before >= lost > after:
+            share = math.log(before / lost) / math.log(before / after)
+            return low * (high / low) ** share
+    return None
+
+
+def table(args):
+    scenes = {}
+    for row in csv.DictReader(open(args.rows)):
+        numbers = {key: float(value) for key, value in row.items() if key not in ("scene", "picture")}
+        scenes.setdefault(row["scene"], {})[row["picture"]] = numbers
+    for kind, oracle, suffix in (("denoised", "oracle-denoised", "-denoised"), ("noisy", "oracle", "")):
+        print(f"\n| {kind} | oracle: spp, s; worst, median | " + " | ".join(f"uniform {n}" for n in UNIFORM)
+              + " | uniform until as good |")
+        print("|---" * (3 + len(UNIFORM)) + "|")
+        ratios = []
+        for scene, found in scenes.items():
+            if oracle not in found:
+                continue
+            ours = found[oracle]
+            series = [(n, found[f"uniform-{n}{suffix}"]["worst"]) for n in UNIFORM if f"uniform-{n}{suffix}" in found]
+            spp = as_good(series, ours["worst"])
+            bound = f"> {series[-1][0]}" if series[-1][1] > ours["worst"] else f"< {series[0][0]}"
+            if spp:
+                ratios.append(spp / ours["spp"])
+            cell = f"{spp:.0f}, ×{spp / ours['spp']:.2f}" if spp else bound
+            cells = [f"{lost:.2f}" for _, lost in series]
+            print(f"| {scene} | {ours['spp']:.0f}, {ours['seconds']:.0f}; {ours['worst']:.2f}, {ours['median']:.2f} | "
+                  + " | ".join(cells) + f" | {cell} |")
+        if ratios:
+            print(f"\nmedian of the {len(ratios)} that are bracketed: ×{np.median(ratios):.2f}, lowest ×{min(ratios):.2f}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--noisefloor", default="target/release/noisefloor")
+    commands = parser.add_subparsers(required=True)
+    for command, words in {render: ["out", "scenes"], measure: ["out"], package: ["out", "scene"], table: ["rows"]}.items():
+        sub = commands.add_parser(command.__name__)
+        sub.set_defaults(run=command)
+        for word in words:
+            sub.add_argument(word, nargs="+" if word == "scenes" else None)
+        if command is render:
+            sub.add_argument("--size", default="480x270")
+            sub.add_argument("--reference", type=int, default=4096)
+    args = parser.parse_args()
+    args.run(args)
+
+
+if __name__ == "__main__":
+    main()
