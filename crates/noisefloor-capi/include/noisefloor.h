@@ -190,6 +190,17 @@ typedef struct {
     uint64_t point;
 } NfRequest;
 
+// Denoises a whole picture, noisy, into denoised: each has 3 * width * height floats. albedo and normal are NULL, or
+// as large. What it writes hangs on these arguments alone. Returns 0, or anything else if it failed. It cannot use
+// sessions.
+typedef int32_t (*NfDenoise)(void *user,
+                             uint32_t width,
+                             uint32_t height,
+                             const float *noisy,
+                             const float *albedo,
+                             const float *normal,
+                             float *denoised);
+
 // Where a tile stands.
 typedef struct {
     // Samples per pixel; if the tile is done, when it stopped.
@@ -312,6 +323,29 @@ NfStatus nf_session_requests(const NfSession *session,
 // tiles that were done can be open again: render until there are no requests.
 NfStatus nf_session_judge(const NfSession *session,
                           size_t *newly_done);
+
+// As nf_session_new, for pictures that are denoised before anyone sees them: a tile is done when what denoise makes of
+// the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, by the
+// vision model; nobody has been asked about denoised pictures. Both halves of the samples are denoised apart, so a
+// verdict takes two calls, on a thread that calls nf_session_judge: params is NULL for the defaults with the schedule
+// NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
+// NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
+// independent of each other.
+NfStatus nf_session_new_denoised(size_t width,
+                                 size_t height,
+                                 NfDenoise denoise,
+                                 void *user,
+                                 double lost,
+                                 const float *const *first_hits,
+                                 size_t floats,
+                                 const NfParams *params,
+                                 NfSession **session);
+
+// Just-objectionable differences that each denoised tile has lost, by its last verdict: a double for each tile, NaN
+// before the first. NF_STATUS_UNAVAILABLE if the session has no denoiser.
+NfStatus nf_session_jods_lost(const NfSession *session,
+                              double *lost,
+                              size_t capacity);
 
 // Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
 // tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red

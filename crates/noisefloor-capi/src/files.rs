@@ -4,7 +4,7 @@ use crate::border;
 use crate::handle;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{Checkpoint, Session};
+use noisefloor::Checkpoint;
 use std::ffi::c_char;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -109,10 +109,5 @@ fn resume(session: &NfSession, job: &str, from: impl Read) -> Result<(), Failure
     // The film that is read, and the one that it is checked against
     border::memory(session.grid, 2 * FILM)?;
     let checkpoint = Checkpoint::read(from)?;
-    let mut locked = session.lock()?;
-    let grid = locked.film().grid();
-    let mut fresh = Session::new(grid.width(), grid.height(), locked.criterion().clone(), *locked.params())?;
-    fresh.set_pixels(locked.pixels());
-    *locked = fresh.resume(job, checkpoint)?;
-    Ok(())
+    session.resume(job, checkpoint)
 }

@@ -7,7 +7,7 @@
 //! - `border.rs`: pointers from C become references and slices, checked as far as that is possible;
 //! - `handle.rs`: handles, which are never followed;
 //! - `params.rs`, `tone.rs`, `eyes.rs`, `oracle.rs`, `session.rs`, `push.rs`, `results.rs`, `files.rs`,
-//!   `check.rs`, `tune.rs`: the functions;
+//!   `check.rs`, `denoise.rs`, `tune.rs`: the functions;
 //! - `wasm.rs`: what JavaScript needs beside them.
 #![allow(unsafe_code, reason = "pointers come from C; nothing else here is unsafe")]
 #![allow(unreachable_pub, reason = "C reaches what Rust does not, and cbindgen takes only what is public")]
@@ -15,6 +15,7 @@
 
 mod border;
 mod check;
+mod denoise;
 mod eyes;
 mod files;
 mod handle;

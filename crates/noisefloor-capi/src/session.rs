@@ -1,17 +1,61 @@
 //! Sessions: pushed samples in, stops out.
 
 use crate::border;
+use crate::denoise::{DenoisedBy, not_while_denoising};
 use crate::handle;
 use crate::oracle::NfOracle;
 use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{Oracle, Params, Request, Rgb, Session, Tile, TileGrid};
-use std::sync::{Mutex, MutexGuard};
+use noisefloor::{Checkpoint, Oracle, Params, Request, Rgb, Session, StoppingCriterion, Tile, TileGrid};
+use noisefloor_denoise::DenoisedRecord;
+use std::ops::{Deref, DerefMut};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Film, oracle and limits of one picture.
 pub struct NfSession {
-    session: Mutex<Session<Oracle>>,
+    judged: Mutex<Judged>,
+    judging: Judging,
     pub(crate) grid: TileGrid,
+}
+
+/// What a session judges by: a session that is resumed gets a new criterion.
+pub(crate) enum Judging {
+    Noise(Box<Oracle>),
+    Denoised(DenoisedBy),
+}
+
+/// A session, and what became of its denoised pictures.
+pub(crate) struct Judged {
+    session: Session<Box<dyn StoppingCriterion + Send>>,
+    pub(crate) record: Option<Arc<Mutex<DenoisedRecord>>>,
+}
+
+impl Deref for Judged {
+    type Target = Session<Box<dyn StoppingCriterion + Send>>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.session
+    }
+}
+
+impl DerefMut for Judged {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.session
+    }
+}
+
+impl Judging {
+    fn fresh(&self, (width, height): (usize, usize), params: Params) -> Result<Judged, Failure> {
+        let (criterion, record): (Box<dyn StoppingCriterion + Send>, _) = match self {
+            Self::Noise(oracle) => (oracle.clone(), None),
+            Self::Denoised(denoised) => {
+                let quality = denoised.quality();
+                let record = quality.record();
+                (Box::new(quality), Some(record))
+            }
+        };
+        Ok(Judged { session: Session::new(width, height, criterion, params)?, record })
+    }
 }
 
 impl handle::Handle for NfSession {
@@ -53,13 +97,24 @@ pub struct NfRequest {
 }
 
 impl NfSession {
-    pub(crate) fn new(session: Session<Oracle>) -> Self {
-        Self { grid: session.film().grid(), session: Mutex::new(session) }
+    pub(crate) fn new(size: (usize, usize), judging: Judging, params: Params) -> Result<Self, Failure> {
+        let judged = judging.fresh(size, params)?;
+        Ok(Self { grid: judged.film().grid(), judged: Mutex::new(judged), judging })
     }
 
-    pub(crate) fn lock(&self) -> Result<MutexGuard<'_, Session<Oracle>>, Failure> {
+    pub(crate) fn lock(&self) -> Result<MutexGuard<'_, Judged>, Failure> {
+        not_while_denoising()?;
         let broken = "the session cannot be used since an error inside the library";
-        self.session.lock().map_err(|_| Failure::new(NfStatus::Internal, broken))
+        self.judged.lock().map_err(|_| Failure::new(NfStatus::Internal, broken))
+    }
+
+    /// Takes the place of what the session was.
+    pub(crate) fn resume(&self, job: &str, checkpoint: Checkpoint<'_>) -> Result<(), Failure> {
+        let mut locked = self.lock()?;
+        let mut fresh = self.judging.fresh((self.grid.width(), self.grid.height()), *locked.params())?;
+        fresh.set_pixels(locked.pixels());
+        *locked = Judged { session: fresh.session.resume(job, checkpoint)?, record: fresh.record };
+        Ok(())
     }
 
     pub(crate) fn tile(&self, index: usize) -> Result<Tile, Failure> {
@@ -95,7 +150,7 @@ pub unsafe extern "C" fn nf_session_new(
             // SAFETY: not null, and promised by the caller.
             unsafe { border::object(params, "params")?.to_params() }?
         };
-        let make = || Ok(NfSession::new(Session::new(width, height, oracle.0.clone(), params)?));
+        let make = || NfSession::new((width, height), Judging::Noise(Box::new(oracle.0.clone())), params);
         // SAFETY: promised by the caller.
         unsafe { handle::give(session, make) }
     })

@@ -15,6 +15,7 @@ use noisefloor::{Oracle, Params, Rgb, Session, Tile, criterion::CriterionError};
 use std::ffi::{CStr, CString, c_void};
 use std::ptr::{null, null_mut};
 
+mod denoise;
 #[cfg(target_os = "linux")]
 mod memory;
 mod wasm;

@@ -19,6 +19,7 @@ mod check;
 mod errors;
 mod eyes;
 mod files;
+mod judging;
 mod metrics;
 mod oracle;
 mod params;

@@ -2,15 +2,17 @@
 
 use crate::arrays::{Pixels, picture, plane};
 use crate::errors::{Error, ParameterError, Raise, SizeError, file_error, whole};
+use crate::judging::{Criterion, Hits, Judged, Judging, not_while_denoising};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pickle::reduced;
 use crate::pool;
 use crate::verdicts::{PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{
-    Checkpoint, Oracle, Params, Rgb, Session, StopReason, Tile, TileGrid, checkpoint::CheckpointError,
-    session::Interruption, session::SessionError, source::PixelNoise,
+    Checkpoint, Oracle, Params, Rgb, Schedule, Session, StopReason, Tile, TileGrid,
+    checkpoint::CheckpointError, session::Interruption, session::SessionError, source::PixelNoise,
 };
+use noisefloor_denoise::DEFAULT_JODS_LOST;
 use noisefloor_image::{WriteError, write_atomic};
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyUserWarning;
@@ -20,8 +22,9 @@ use pyo3::types::{PyBytes, PyType};
 use std::ffi::CString;
 use std::fs::File;
 use std::io::BufReader;
+use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Film, oracle and limits of one picture: a renderer pushes samples, and is told which tiles need more.
 ///
@@ -29,42 +32,79 @@ use std::sync::{Mutex, MutexGuard};
 /// oracle: an Oracle; None is Oracle(). params: a Params; None is Params().
 /// shared_pixels: whether neighbouring pixels have noise in common, by a pixel filter, a denoiser or a Markov
 ///     chain: no warning says so then.
+/// denoiser: a function that takes the linear radiance of a whole picture, an array of shape (height, width, 3), and
+///     returns it denoised. Tiles are then done when the denoised picture has lost at most `lost` just-objectionable
+///     differences (JOD) against the converged one, by the vision model: nobody has been asked about denoised
+///     pictures. Both halves of the samples are denoised apart, so a verdict takes two calls: params is
+///     Params(schedule="growing", step=48, min_spp=48) unless given. What it returns must hang on its arguments
+///     alone. It takes the place of oracle, and cannot use sessions.
+/// first_hits: ((albedo, normal), (albedo, normal)), a pair for each half, independent of each other: arrays of shape
+///     (height, width, 3). The denoiser is then called with (radiance, albedo, normal).
 ///
 /// Threads may call any method at any time; calls take turns. The interpreter's lock is released while
 /// judging. A copy, or what pickle makes of a session elsewhere, is one that was saved and resumed: tiles that
 /// close_all ended are open in it.
 ///
-/// Raises SizeError if the picture or a tile has an impossible size.
+/// Raises SizeError if the picture, a tile or first_hits has an impossible size, ParameterError if oracle and denoiser
+/// are given.
 #[pyclass(frozen, name = "Session", module = "noisefloor")]
 pub(crate) struct PySession {
-    session: Mutex<Session<Oracle>>,
+    judged: Mutex<Judged>,
+    judging: Judging,
     grid: TileGrid,
     pixels: PixelNoise,
+}
+
+/// The session in a lock.
+struct MappedGuard<'a>(MutexGuard<'a, Judged>);
+
+impl Deref for MappedGuard<'_> {
+    type Target = Session<Criterion>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0.session
+    }
+}
+
+impl DerefMut for MappedGuard<'_> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0.session
+    }
 }
 
 const BROKEN: &str = "the session cannot be used since an error inside the library";
 
 impl PySession {
-    fn made(session: Session<Oracle>, pixels: PixelNoise) -> PyResult<Self> {
-        Ok(Self { grid: session.film().grid(), session: Mutex::new(session), pixels })
+    /// A session that has not begun.
+    fn fresh(
+        py: Python<'_>,
+        (width, height): (usize, usize),
+        judging: Judging,
+        params: Params,
+        pixels: PixelNoise,
+    ) -> PyResult<Self> {
+        let judged = fresh(py, (width, height), &judging, params, pixels)?;
+        Ok(Self { grid: judged.session.film().grid(), judged: Mutex::new(judged), judging, pixels })
     }
 
     /// The session, for something short. Others may have the interpreter while this waits.
-    fn attached(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Session<Oracle>>> {
-        self.session.lock_py_attached(py).map_err(|_| Error::new_err(BROKEN))
+    fn attached(&self, py: Python<'_>) -> PyResult<MappedGuard<'_>> {
+        not_while_denoising()?;
+        Ok(MappedGuard(self.judged.lock_py_attached(py).map_err(|_| Error::new_err(BROKEN))?))
     }
 
     /// Does something long without the interpreter.
     fn detached<T: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Session<Oracle>) -> T + Send,
+        work: impl FnOnce(&mut Session<Criterion>) -> T + Send,
     ) -> PyResult<T> {
-        let locked = |mut session: MutexGuard<'_, Session<Oracle>>| {
-            let session = &mut *session;
+        not_while_denoising()?;
+        let locked = |mut judged: MutexGuard<'_, Judged>| {
+            let session = &mut judged.session;
             pool::run(|| work(session))
         };
-        py.detach(|| self.session.lock().map(locked).ok()).ok_or_else(|| Error::new_err(BROKEN))
+        py.detach(|| self.judged.lock().map(locked).ok()).ok_or_else(|| Error::new_err(BROKEN))
     }
 
     fn size(&self) -> (usize, usize) {
@@ -97,18 +137,38 @@ impl PySession {
 #[pymethods]
 impl PySession {
     #[new]
-    #[pyo3(signature = (width, height, oracle = None, params = None, shared_pixels = false))]
+    #[pyo3(signature = (width, height, oracle = None, params = None, shared_pixels = false, *, denoiser = None,
+        lost = DEFAULT_JODS_LOST, first_hits = None))]
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
+        py: Python<'_>,
         #[pyo3(from_py_with = whole)] width: usize,
         #[pyo3(from_py_with = whole)] height: usize,
         oracle: Option<PyRef<'_, PyOracle>>,
         params: Option<PyParams>,
         shared_pixels: bool,
+        denoiser: Option<Bound<'_, PyAny>>,
+        lost: f64,
+        first_hits: Option<Hits<'_>>,
     ) -> PyResult<Self> {
-        let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
-        let params = params.map_or_else(Params::default, |params| params.0);
-        let pixels = noise(shared_pixels);
-        Self::made(fresh((width, height), oracle, params, pixels)?, pixels)
+        let (judging, default) = match (denoiser, oracle) {
+            (Some(_), Some(_)) => {
+                return Err(ParameterError::new_err("give either oracle or denoiser, not both"));
+            }
+            (None, _) if first_hits.is_some() => {
+                return Err(ParameterError::new_err("first_hits are for a denoiser"));
+            }
+            (None, oracle) => {
+                let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
+                (Judging::Noise(Box::new(oracle)), Params::default())
+            }
+            (Some(denoiser), None) => {
+                let seldom = Params::default().with_schedule(Schedule::Growing { step: 48 }).with_min_spp(48);
+                (Judging::denoised(&denoiser, lost, first_hits, (width, height))?, seldom)
+            }
+        };
+        let params = params.map_or(default, |params| params.0);
+        Self::fresh(py, (width, height), judging, params, noise(shared_pixels))
     }
 
     /// Width of the picture in pixels.
@@ -202,13 +262,15 @@ impl PySession {
     /// can be open again: render until done is true.
     ///
     /// Warns of samples that are likely to be wrong, each kind once, and after resume() once more. Raises FaultError if they cannot be what
-    /// they are said to be: no tile is done then. Raises CriterionError if the model cannot judge these tiles.
+    /// they are said to be: no tile is done then. Raises CriterionError if the model cannot judge these tiles, and what
+    /// a denoiser raises.
     fn judge(&self, py: Python<'_>) -> PyResult<Vec<PyStop>> {
-        let judge = |session: &mut Session<Oracle>| -> Result<_, SessionError> {
+        let judge = |session: &mut Session<Criterion>| -> Result<_, SessionError> {
             let stops = session.judge()?;
             Ok((stops, session.new_warnings()))
         };
-        let (stops, warnings) = self.detached(py, judge)?.map_err(Raise::raise)?;
+        let failed = |error: SessionError| self.judging.raised().unwrap_or_else(|| error.raise());
+        let (stops, warnings) = self.detached(py, judge)?.map_err(failed)?;
         for warning in warnings {
             let text = CString::new(warning.to_string()).unwrap_or_default();
             PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
@@ -297,6 +359,16 @@ impl PySession {
         map.map(|map| plane(py, self.size(), map)).transpose()
     }
 
+    /// Just-objectionable differences that the denoised tiles have lost, by their last verdicts: float64 of shape
+    /// (height, width), NaN before. None without a denoiser.
+    fn jods_lost<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let guard = self.attached(py)?;
+        let Some(record) = &guard.0.record else { return Ok(None) };
+        let record = record.lock().unwrap_or_else(PoisonError::into_inner);
+        let lost = self.spread(|tile| record.jods_lost.get(tile).copied().unwrap_or(f64::NAN));
+        plane(py, self.size(), lost).map(Some)
+    }
+
     /// Writes a snapshot to a file, for resuming the session. The file is whole or not there.
     ///
     /// job: names all that the samples depend on: scene, seed, options of the renderer.
@@ -313,35 +385,51 @@ impl PySession {
     /// Raises OSError if the file cannot be read, CheckpointError if it is damaged or of another job; the
     /// session is then as it was.
     fn resume(&self, py: Python<'_>, path: PathBuf, job: &str) -> PyResult<()> {
-        self.detached(py, |session| resume(session, self.pixels, &path, job))?
+        let file = File::open(&path).map_err(|error| file_error(&path, &error))?;
+        let checkpoint = py.detach(|| Checkpoint::read(BufReader::new(file)));
+        let checkpoint = checkpoint.map_err(|error| raise(&path, error))?;
+        let mut guard = self.attached(py)?;
+        let judged = fresh(py, self.size(), &self.judging, *guard.params(), self.pixels)?;
+        let session = judged.session.resume(job, checkpoint).map_err(|error| raise(&path, error))?;
+        *guard.0 = Judged { session, ..judged };
+        Ok(())
     }
 
     /// What pickle makes it from: a checkpoint, in memory.
     #[classmethod]
     fn _restore(
-        _class: &Bound<'_, PyType>,
+        class: &Bound<'_, PyType>,
         size: (usize, usize),
-        oracle: PyRef<'_, PyOracle>,
+        judging: &Bound<'_, PyAny>,
         params: PyParams,
         shared_pixels: bool,
         checkpoint: &[u8],
     ) -> PyResult<Self> {
-        let pixels = noise(shared_pixels);
-        let session = fresh(size, oracle.0.clone(), params.0, pixels)?;
+        let (py, pixels) = (class.py(), noise(shared_pixels));
+        let judging = Judging::from_python(judging, size)?;
+        let judged = fresh(py, size, &judging, params.0, pixels)?;
         let checkpoint = Checkpoint::read(checkpoint).map_err(Raise::raise)?;
-        Self::made(session.resume(PICKLED, checkpoint).map_err(Raise::raise)?, pixels)
+        let session = judged.session.resume(PICKLED, checkpoint).map_err(Raise::raise)?;
+        let judged = Mutex::new(Judged { session, ..judged });
+        Ok(Self {
+            grid: TileGrid::new(size.0, size.1, params.0.tile).map_err(Raise::raise)?,
+            judged,
+            judging,
+            pixels,
+        })
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let mut kept = Vec::new();
-        let (oracle, params) = self
+        let params = self
             .detached(py, |session| {
                 session.checkpoint(PICKLED)?.write(&mut kept)?;
-                Ok((PyOracle(session.criterion().clone()), PyParams(*session.params())))
+                Ok(PyParams(*session.params()))
             })?
             .map_err(|error: CheckpointError| error.raise())?;
+        let (size, judging) = (self.size(), self.judging.to_python(py, self.size())?);
         let shared_pixels = self.pixels == PixelNoise::Shared;
-        reduced::<Self>(py, (self.size(), oracle, params, shared_pixels, PyBytes::new(py, &kept)))
+        reduced::<Self>(py, (size, judging, params, shared_pixels, PyBytes::new(py, &kept)))
     }
 
     fn __repr__(&self) -> String {
@@ -358,17 +446,19 @@ fn noise(shared: bool) -> PixelNoise {
 }
 
 fn fresh(
+    py: Python<'_>,
     (width, height): (usize, usize),
-    oracle: Oracle,
+    judging: &Judging,
     params: Params,
     pixels: PixelNoise,
-) -> PyResult<Session<Oracle>> {
-    let mut session = Session::new(width, height, oracle, params).map_err(Raise::raise)?;
+) -> PyResult<Judged> {
+    let (criterion, record) = judging.make(py)?;
+    let mut session = Session::new(width, height, criterion, params).map_err(Raise::raise)?;
     session.set_pixels(pixels);
-    Ok(session)
+    Ok(Judged { session, record })
 }
 
-fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
+fn save(session: &Session<Criterion>, path: &Path, job: &str) -> PyResult<()> {
     let checkpoint = session.checkpoint(job).map_err(Raise::raise)?;
     write_atomic(path, |writer| checkpoint.write(writer)).map_err(|error| match error {
         WriteError::Failed { path, source } => match source.downcast() {
@@ -377,15 +467,6 @@ fn save(session: &Session<Oracle>, path: &Path, job: &str) -> PyResult<()> {
         },
         other => other.raise(),
     })
-}
-
-fn resume(session: &mut Session<Oracle>, pixels: PixelNoise, path: &Path, job: &str) -> PyResult<()> {
-    let file = File::open(path).map_err(|error| file_error(path, &error))?;
-    let checkpoint = Checkpoint::read(BufReader::new(file)).map_err(|error| raise(path, error))?;
-    let grid = session.film().grid();
-    let fresh = fresh((grid.width(), grid.height()), session.criterion().clone(), *session.params(), pixels)?;
-    *session = fresh.resume(job, checkpoint).map_err(|error| raise(path, error))?;
-    Ok(())
 }
 
 fn raise(path: &Path, error: CheckpointError) -> PyErr {

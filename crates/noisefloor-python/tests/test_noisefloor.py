@@ -5,6 +5,7 @@ import concurrent.futures
 import copy
 import inspect
 import multiprocessing
+import math
 import os
 import pathlib
 import pickle
@@ -327,6 +328,148 @@ class Faults(unittest.TestCase):
             nf.check(lambda tile, first, spp: np.zeros((1, 1, 3)))
         with self.assertRaises(ZeroDivisionError):
             nf.check(lambda tile, first, spp: 1 // 0)
+
+
+def smooth(radiance):
+    """A mean over 9x9 pixels: a denoiser, of module level so that it can be pickled."""
+    padded = np.pad(radiance, ((4, 4), (4, 4), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (9, 9), axis=(0, 1))
+    return windows.mean(axis=(-2, -1)).astype(np.float32)
+
+
+class Denoised(unittest.TestCase):
+    """Tiles stop by what a function of Python makes of the samples."""
+
+    SIZE = (64, 96)
+
+    def session(self, denoiser, **options):
+        params = nf.Params(tile=32, schedule="growing", step=16, min_spp=16, max_spp=500, tone_mapping="srgb")
+        return nf.Session(96, 64, params=options.pop("params", params), denoiser=denoiser, **options)
+
+    def render(self, session, sigma=0.3):
+        """A grey wall."""
+        random = np.random.default_rng(5)
+        while not session.done:
+            for request in session.requests():
+                shape = (request.tile.height, request.tile.width, 3)
+                mean = 0.4 + sigma / math.sqrt(request.spp) * random.standard_normal(shape)
+                session.push(request.tile, request.spp, mean.astype(np.float32))
+            session.judge()
+        return [(stop.spp, stop.reason) for stop in session.stops()]
+
+    def test_tiles_stop_by_the_denoised_picture(self):
+        stops = {}
+        perfect = lambda radiance: np.full_like(radiance, 0.4)
+        calls = []
+        identity = lambda radiance: calls.append(radiance.shape) or radiance
+        ramp = np.linspace(0.2, 0.6, 96, dtype=np.float32)[None, :, None]
+        wrong = lambda radiance: np.broadcast_to(ramp, radiance.shape)
+        for denoiser in (perfect, smooth, identity, wrong):
+            session = self.session(denoiser)
+            stops[denoiser] = self.render(session)
+            lost = session.jods_lost()
+            self.assertEqual(lost.shape, self.SIZE)
+            converged = all(reason == "converged" for _, reason in stops[denoiser])
+            self.assertEqual(converged, bool((lost <= 0.3).all()), denoiser)
+            self.assertIsNone(session.visible_noise())
+        # Noise that both halves have in common by chance passes for a bias of even the perfect picture
+        self.assertTrue(all(a <= b for (a, _), (b, _) in zip(stops[perfect], stops[smooth])), stops)
+        # Nine by nine pixels have a ninth of the noise
+        self.assertLess(max(spp for spp, _ in stops[smooth]), min(spp for spp, _ in stops[identity]))
+        # A picture that is wrong by itself gets no better
+        self.assertTrue(all(stop == (500, "max-spp") for stop in stops[wrong]), stops[wrong])
+        # Two halves for each verdict, whole
+        self.assertEqual(set(calls), {(*self.SIZE, 3)})
+        self.assertEqual(len(calls) % 2, 0)
+        self.assertIsNone(nf.Session(64, 64).jods_lost())
+
+    def test_the_loss_is_that_of_two_pictures(self):
+        """By excess(), which has no session, for one tile as large as its squares."""
+        random = np.random.default_rng(3)
+        noise = lambda: (0.4 + 0.05 * random.standard_normal((64, 64, 3))).astype(np.float32)
+        a, b = noise(), noise()
+        params = nf.Params(tile=64, schedule="every", step=16, min_spp=32, max_spp=32, tone_mapping="srgb")
+        session = nf.Session(64, 64, params=params, denoiser=smooth)
+        for half in (a, b):
+            session.push(0, 16, half)
+        session.judge()
+        excess = nf.excess(a, b, denoised=(smooth(a), smooth(b)), params=params)
+        self.assertAlmostEqual(float(session.jods_lost()[0, 0]), 0.3 * excess.ratio, places=4)
+
+    def test_albedo_and_normals_are_passed_on(self):
+        hits = [[np.full((*self.SIZE, 3), value, dtype=np.float32) for value in pair] for pair in ((1, 2), (3, 4))]
+        seen = []
+
+        def denoiser(radiance, albedo, normal):
+            seen.append((float(albedo[0, 0, 0]), float(normal[0, 0, 0])))
+            return np.full_like(radiance, 0.4)
+
+        self.render(self.session(denoiser, first_hits=hits))
+        self.assertEqual(seen, [(1.0, 2.0), (3.0, 4.0)] * (len(seen) // 2))
+        with self.assertRaisesRegex(nf.SizeError, "first_hits"):
+            self.session(denoiser, first_hits=[[np.zeros((2, 2, 3), np.float32)] * 2] * 2)
+        with self.assertRaisesRegex(nf.ParameterError, "denoiser"):
+            nf.Session(96, 64, first_hits=hits)
+
+    def test_what_a_denoiser_does_wrong_is_said(self):
+        def fails(radiance):
+            raise KeyError("no weights")
+
+        sessions = []
+        cases = [
+            (fails, KeyError, "no weights"),
+            (lambda radiance: radiance[1:], nf.SizeError, "denoiser: an array has shape"),
+            (lambda radiance: radiance * np.nan, nf.ParameterError, "finite"),
+            (lambda radiance: None, nf.SizeError, "."),
+            (lambda radiance: sessions[-1].image(), nf.Error, "waits for it"),
+        ]
+        for denoiser, error, text in cases:
+            sessions.append(self.session(denoiser))
+            with self.assertRaisesRegex(error, text):
+                self.render(sessions[-1])
+            # It is as it was: nothing is lost
+            self.assertEqual(sessions[-1].open_tiles, 6)
+        for wrong, error in [
+            (dict(denoiser=smooth, oracle=nf.Oracle()), nf.ParameterError),
+            (dict(denoiser=3), nf.ParameterError),
+            (dict(denoiser=smooth, lost=0), nf.ParameterError),
+        ]:
+            with self.assertRaises(error):
+                nf.Session(96, 64, **wrong)
+
+    def test_it_is_resumed_and_pickled(self):
+        whole = self.render(self.session(smooth))
+
+        def half_way():
+            session = self.session(smooth)
+            random = np.random.default_rng(5)
+            for request in session.requests():
+                shape = (request.tile.height, request.tile.width, 3)
+                mean = 0.4 + 0.3 / math.sqrt(request.spp) * random.standard_normal(shape)
+                session.push(request.tile, request.spp, mean.astype(np.float32))
+            session.judge()
+            return session, random
+
+        def finish(session, random):
+            while not session.done:
+                for request in session.requests():
+                    shape = (request.tile.height, request.tile.width, 3)
+                    mean = 0.4 + 0.3 / math.sqrt(request.spp) * random.standard_normal(shape)
+                    session.push(request.tile, request.spp, mean.astype(np.float32))
+                session.judge()
+            return [(stop.spp, stop.reason) for stop in session.stops()]
+
+        session, random = half_way()
+        with tempfile.TemporaryDirectory() as folder:
+            session.save(pathlib.Path(folder) / "checkpoint", "a wall")
+            resumed = self.session(smooth)
+            resumed.resume(pathlib.Path(folder) / "checkpoint", "a wall")
+            with self.assertRaises(nf.CheckpointError):
+                self.session(smooth, lost=0.2).resume(pathlib.Path(folder) / "checkpoint", "a wall")
+        np.testing.assert_array_equal(resumed.jods_lost(), session.jods_lost())
+        self.assertEqual(finish(resumed, random), whole)
+        session, random = half_way()
+        self.assertEqual(finish(pickle.loads(pickle.dumps(session)), random), whole)
 
 
 class Errors(unittest.TestCase):
