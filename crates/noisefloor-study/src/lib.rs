@@ -8,8 +8,6 @@
 //! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor
 //!   train`.
 //! - [`explore`] judges one's own pictures in the browser, keeps disagreements, and learns from them.
-//! - [`calibrate`] measures how many samples one's own eyes need, in two minutes.
-//! - [`watch`] shows a render while it runs.
 //! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and
 //!   to plan a study.
 //!
@@ -46,24 +44,17 @@
 //! ```
 
 pub mod analysis;
-pub mod calibrate;
 mod code;
 mod config;
 mod error;
 mod event;
 pub mod explore;
-mod http;
-mod languages;
-mod questplus;
-mod random;
 mod server;
 mod session;
 pub mod simulated;
 mod stack;
 mod stack_render;
 pub mod store;
-mod viewing;
-pub mod watch;
 
 pub use code::parse as parse_code;
 pub use config::{
@@ -71,9 +62,6 @@ pub use config::{
 };
 pub use error::{StoreError, StudyError};
 pub use event::{Choice, Envelope, StudyEvent, TrialTiming};
-pub use http::{Exposure, interrupted};
-pub use languages::{Direction, Language, read_languages};
-pub use questplus::{GUESS, LAPSE, Posterior, QuestGrid, QuestPlus, right, sees};
 pub use server::{
     Beginning, CompletionView, LanguageView, Overview, OverviewRow, SessionView, StackView, StudyServer,
     StudyView,
@@ -85,4 +73,3 @@ pub use session::{
 pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
 pub use stack_render::render_stack;
 pub use store::{AnswerStore, NewSession, SessionRecord};
-pub use viewing::{Ambient, Conditions, ViewingLimits, ViewingProblem};

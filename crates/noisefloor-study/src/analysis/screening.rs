@@ -4,7 +4,7 @@ use super::observers::{Observer, places};
 use super::summary::median;
 use crate::config::{Study, StudyProtocol};
 use crate::session::{Class, Haste, Stage};
-use crate::viewing::ViewingProblem;
+use noisefloor_pages::viewing::ViewingProblem;
 use std::collections::BTreeSet;
 
 /// Fewest observers among whom BT.500 looks for one unlike the others.

@@ -1,7 +1,7 @@
 //! The study file as it is written, before anything is checked.
 
 use super::rules::{Participants, Question, Screening, StudyProtocol, Texts};
-use crate::viewing::ViewingLimits;
+use noisefloor_pages::viewing::ViewingLimits;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;

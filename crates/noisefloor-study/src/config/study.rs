@@ -3,10 +3,10 @@
 use super::file::{StackEntry, StudyFile};
 use super::rules::{Participants, Question, QuestionKind, Screening, StudyProtocol, Texts};
 use crate::error::StudyError;
-use crate::languages::{Language, read_languages};
 use crate::stack::{Source, StudyStack};
-use crate::viewing::ViewingLimits;
 use noisefloor::tile::DEFAULT_TILE;
+use noisefloor_pages::languages::{Language, read_languages};
+use noisefloor_pages::viewing::ViewingLimits;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;

@@ -6,7 +6,6 @@ use super::gallery::{GalleryError, GalleryPicture, PictureView};
 use super::images;
 use super::verdicts::Tiles;
 use crate::error::{StoreError, StudyError};
-use crate::http::{Refusal, read_bytes, read_json};
 use axum::Json;
 use axum::body::Body;
 use axum::extract::rejection::PathRejection;
@@ -19,6 +18,7 @@ use noisefloor::{
     evidence::{Evidence, Samples},
     stills::StillError,
 };
+use noisefloor_pages::http::{Refusal, read_bytes, read_json};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Duration;

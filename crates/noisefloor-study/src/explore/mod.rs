@@ -23,12 +23,12 @@ pub use learn::{AnswerAgreement, LearnStep, Learned, retrain};
 pub use line::{PersonalLine, fit_line};
 
 use crate::error::StudyError;
-use crate::http::{self, Exposure, Guard, Listening};
 use app::App;
 use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{delete, get, post, put};
 use gallery::Gallery;
+use noisefloor_pages::http::{self, Exposure, Guard, Listening};
 use std::future::Future;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
@@ -79,7 +79,7 @@ impl ExploreServer {
     /// Serves until `stop` resolves.
     ///
     /// # Errors
-    /// [`StudyError::Listen`] if the socket fails.
+    /// [`StudyError::Pages`] if the socket fails.
     pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), StudyError> {
         self.listening.serve(self.router, stop).await;
         Ok(())

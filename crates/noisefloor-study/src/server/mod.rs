@@ -13,7 +13,6 @@ pub use views::{Beginning, CompletionView, LanguageView, SessionView, StackView,
 use crate::code;
 use crate::config::Study;
 use crate::error::StudyError;
-use crate::http::{self, Exposure, Guard, Listening};
 use crate::session;
 use crate::store::AnswerStore;
 use app::App;
@@ -21,6 +20,7 @@ use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::Redirect;
 use axum::routing::{get, post};
+use noisefloor_pages::http::{self, Exposure, Guard, Listening};
 use std::fmt;
 use std::future::Future;
 use std::net::SocketAddr;

@@ -4,8 +4,8 @@ use super::plan::Plan;
 use super::state::ParticipantSession;
 use crate::config::Study;
 use crate::error::StoreError;
-use crate::questplus::QuestGrid;
 use crate::store::SessionRecord;
+use noisefloor_pages::questplus::QuestGrid;
 use std::sync::Arc;
 
 /// Replays a session from the database.

@@ -4,8 +4,8 @@ use super::plan::Pair;
 use super::state::{Haste, ParticipantSession, Practice, Shown, Stage};
 use super::trial::{Class, Trial, TrialOutcome, TrialRole};
 use crate::config::Study;
-use crate::questplus::{Posterior, QuestPlus};
-use crate::viewing::{Conditions, ViewingProblem};
+use noisefloor_pages::questplus::{Posterior, QuestPlus};
+use noisefloor_pages::viewing::{Conditions, ViewingProblem};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -98,7 +98,7 @@ fn texts_are_complete_in_both_languages() {
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     let texts = |code: &str| {
         let file = read(&format!("languages/{code}.toml"));
-        toml::from_str::<noisefloor_study::Language>(&file).unwrap().text
+        toml::from_str::<noisefloor_pages::languages::Language>(&file).unwrap().text
     };
     let (english, french) = (texts("en"), texts("fr"));
     let gaps = |text: &str| {

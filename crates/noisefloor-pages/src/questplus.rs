@@ -31,7 +31,7 @@ pub fn right(ln_spp: f64, ln_threshold: f64, scale: f64) -> f64 {
 }
 
 /// Probability of a correct answer of somebody who sees with a probability of `sees`, and else guesses.
-pub(crate) fn right_or_guessed(guess: f64, sees: f64) -> f64 {
+fn right_or_guessed(guess: f64, sees: f64) -> f64 {
     guess + (1.0 - guess - LAPSE) * sees
 }
 
@@ -57,7 +57,7 @@ impl QuestGrid {
 
     /// The same for the logarithms of any levels, of which the first `stimuli` are shown, at least one, in a
     /// task in which guessing is right with a probability of `guess`.
-    pub(crate) fn among(ln: &[f64], stimuli: usize, guess: f64) -> Self {
+    pub fn among(ln: &[f64], stimuli: usize, guess: f64) -> Self {
         let (low, high) = (ln[0] - MARGIN, ln[ln.len() - 1] + MARGIN);
         let hypothesis = |i: usize| {
             let threshold = low + (high - low) * (i / SCALES.len()) as f64 / (THRESHOLDS - 1) as f64;
@@ -100,7 +100,7 @@ impl QuestPlus {
     }
 
     /// Starts with ln(threshold) normal about 0 with this standard deviation.
-    pub(crate) fn about_zero(grid: Arc<QuestGrid>, sd: f64) -> Self {
+    pub fn about_zero(grid: Arc<QuestGrid>, sd: f64) -> Self {
         let prior: Vec<f64> = grid.thresholds.iter().map(|t| (-0.5 * (t / sd).powi(2)).exp()).collect();
         let sum: f64 = prior.iter().sum();
         Self { grid, posterior: prior.into_iter().map(|p| p / sum).collect() }
@@ -139,7 +139,7 @@ impl QuestPlus {
     }
 
     /// Mean scale.
-    pub(crate) fn scale(&self) -> f64 {
+    pub fn scale(&self) -> f64 {
         self.posterior.iter().zip(SCALES.iter().cycle()).map(|(p, scale)| p * scale).sum()
     }
 

@@ -2,8 +2,8 @@
 //!
 //! Whoever renders [publishes](LiveRender::publish) states and pictures; a [`WatchServer`] hands out the latest ones.
 
-use crate::error::StudyError;
-use crate::http::{self, Exposure, Guard, HTML, Listening, PageFile, SCRIPT, STYLE, absent, page_file};
+use crate::error::PagesError;
+use crate::http::{self, Exposure, Guard, HTML, LOOK, Listening, PageFile, SCRIPT, STYLE, absent, page_file};
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{Path, State};
@@ -24,7 +24,7 @@ const GONE: Duration = Duration::from_secs(10);
 const PAGE: &str = include_str!("../pages/watch/index.html");
 const FILES: [PageFile; 3] = [
     ("watch.js", SCRIPT, include_str!("../pages/watch/watch.js")),
-    ("style.css", STYLE, include_str!("../pages/style.css")),
+    LOOK,
     ("watch.css", STYLE, include_str!("../pages/watch/watch.css")),
 ];
 
@@ -143,13 +143,13 @@ impl WatchServer {
     /// Binds an address, of which port 0 picks a free port, and serves; returns the bound address.
     ///
     /// # Errors
-    /// [`StudyError::Listen`] if the address is in use or not of this machine, or there is no thread for it.
+    /// [`PagesError::Listen`] if the address is in use or not of this machine, or there is no thread for it.
     pub fn start(
         live: Arc<LiveRender>,
         address: SocketAddr,
         exposure: &Exposure,
-    ) -> Result<SocketAddr, StudyError> {
-        let failed = |source: io::Error| StudyError::Listen { address: address.to_string(), source };
+    ) -> Result<SocketAddr, PagesError> {
+        let failed = |source: io::Error| PagesError::Listen { address: address.to_string(), source };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let listening = runtime.block_on(Listening::bind(address, exposure))?;
         let bound = listening.address();

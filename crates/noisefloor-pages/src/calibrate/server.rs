@@ -1,10 +1,10 @@
 //! A calibration in the browser: one person, one page.
 
 use super::{CHOICES, Calibration, CalibrationStage, CalibrationTile, EDGE, Factor};
-use crate::error::StudyError;
+use crate::error::PagesError;
 use crate::http::{
-    self, Exposure, Guard, HTML, Listening, PageFile, Refusal, SCRIPT, STYLE, absent, interrupted, page_file,
-    read_json,
+    self, ASK, Exposure, Guard, HTML, LOOK, Listening, PICTURE, PageFile, Refusal, SCRIPT, SHEET, STYLE,
+    VIEWING, absent, interrupted, page_file, read_json,
 };
 use crate::languages::{parse_language, read_languages};
 use crate::viewing::{Conditions, ViewingLimits, ViewingProblem};
@@ -29,13 +29,13 @@ use tokio::sync::Notify;
 
 const PAGE: &str = include_str!("../../pages/calibrate/index.html");
 const FILES: [PageFile; 7] = [
-    ("ask.js", SCRIPT, include_str!("../../pages/ask.js")),
+    ASK,
     ("calibrate.css", STYLE, include_str!("../../pages/calibrate/calibrate.css")),
     ("calibrate.js", SCRIPT, include_str!("../../pages/calibrate/calibrate.js")),
-    ("picture.js", SCRIPT, include_str!("../../pages/picture.js")),
-    ("sheet.js", SCRIPT, include_str!("../../pages/sheet.js")),
-    ("style.css", STYLE, include_str!("../../pages/style.css")),
-    ("viewing.js", SCRIPT, include_str!("../../pages/viewing.js")),
+    PICTURE,
+    SHEET,
+    LOOK,
+    VIEWING,
 ];
 /// What this page says beyond the texts of studies.
 const TEXTS: [(&str, &str); 2] = [
@@ -110,9 +110,9 @@ impl CalibrateServer {
     /// Binds the address. Port 0 picks a free port.
     ///
     /// # Errors
-    /// [`StudyError::Listen`] if the address is in use or not of this machine.
-    pub fn bind(setup: CalibrateSetup, address: SocketAddr, exposure: &Exposure) -> Result<Self, StudyError> {
-        let failed = |source: io::Error| StudyError::Listen { address: address.to_string(), source };
+    /// [`PagesError::Listen`] if the address is in use or not of this machine.
+    pub fn bind(setup: CalibrateSetup, address: SocketAddr, exposure: &Exposure) -> Result<Self, PagesError> {
+        let failed = |source: io::Error| PagesError::Listen { address: address.to_string(), source };
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
         let runtime = runtime.map_err(failed)?;
         let listening = runtime.block_on(Listening::bind(address, exposure))?;

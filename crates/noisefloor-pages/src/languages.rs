@@ -1,6 +1,6 @@
 //! Texts of the pages, one TOML file per language. English and French are built in; a study can bring others.
 
-use crate::error::StudyError;
+use crate::error::PagesError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -36,15 +36,15 @@ pub struct Language {
 /// replaces the built-in one.
 ///
 /// # Errors
-/// [`StudyError`] if a file is malformed, or lacks a text that the English one has.
-pub fn read_languages(folder: Option<&Path>) -> Result<BTreeMap<String, Language>, StudyError> {
+/// [`PagesError`] if a file is malformed, or lacks a text that the English one has.
+pub fn read_languages(folder: Option<&Path>) -> Result<BTreeMap<String, Language>, PagesError> {
     let mut languages = BTreeMap::new();
     for (code, text) in BUILT_IN {
         languages.insert(code.to_owned(), parse_language(text, Path::new(code))?);
     }
     let english = languages["en"].clone();
     let Some(folder) = folder else { return Ok(languages) };
-    let io = |source| StudyError::Io { path: folder.to_owned(), source };
+    let io = |source| PagesError::Io { path: folder.to_owned(), source };
     for entry in std::fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
         let Some(code) = path.file_stem().and_then(|s| s.to_str()) else { continue };
@@ -58,24 +58,29 @@ pub fn read_languages(folder: Option<&Path>) -> Result<BTreeMap<String, Language
     Ok(languages)
 }
 
-fn read(path: &Path) -> Result<String, StudyError> {
-    let io = |source| StudyError::Io { path: path.to_owned(), source };
+fn read(path: &Path) -> Result<String, PagesError> {
+    let io = |source| PagesError::Io { path: path.to_owned(), source };
     if path.metadata().map_err(io)?.len() > MAX_FILE {
         let what = format!("longer than {MAX_FILE} bytes");
-        return Err(StudyError::File { path: path.to_owned(), what });
+        return Err(PagesError::Language { path: path.to_owned(), what });
     }
     std::fs::read_to_string(path).map_err(io)
 }
 
 /// Parses one file.
-pub(crate) fn parse_language(text: &str, path: &Path) -> Result<Language, StudyError> {
-    toml::from_str(text)
-        .map_err(|e| StudyError::File { path: path.to_owned(), what: e.to_string().trim_end().to_owned() })
+///
+/// # Errors
+/// [`PagesError::Language`] if it is malformed.
+pub fn parse_language(text: &str, path: &Path) -> Result<Language, PagesError> {
+    toml::from_str(text).map_err(|e| PagesError::Language {
+        path: path.to_owned(),
+        what: e.to_string().trim_end().to_owned(),
+    })
 }
 
 /// Every text of the English file exists, with the same places to fill in, and no other.
-fn check(language: &Language, english: &Language, path: &Path) -> Result<(), StudyError> {
-    let bad = |what: String| StudyError::File { path: path.to_owned(), what };
+fn check(language: &Language, english: &Language, path: &Path) -> Result<(), PagesError> {
+    let bad = |what: String| PagesError::Language { path: path.to_owned(), what };
     for (name, text) in &english.text {
         let Some(own) = language.text.get(name) else {
             return Err(bad(format!("has no text {name:?}; pages/languages/en.toml lists them all")));

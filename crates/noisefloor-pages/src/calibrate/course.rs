@@ -123,7 +123,7 @@ impl Calibration {
     }
 
     /// Begins with known thresholds of the model's observers, one of each tile.
-    pub(crate) fn with(thresholds: Vec<f64>, seed: u64) -> Self {
+    pub(super) fn with(thresholds: Vec<f64>, seed: u64) -> Self {
         let levels: Vec<f64> = (0..STEPS as u32).map(level).collect();
         let grid = Arc::new(QuestGrid::among(&levels, STEPS, 1.0 / CHOICES as f64));
         let mut begun = Self {

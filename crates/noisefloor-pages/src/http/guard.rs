@@ -24,7 +24,8 @@ const SESSIONS: usize = 60;
 const MOST_ADDRESSES: usize = 10_000;
 
 /// Names of the server, and wrong codes by address.
-pub(crate) struct Guard {
+#[derive(Debug)]
+pub struct Guard {
     hosts: Vec<String>,
     /// Port at which any address of this machine is known, if the server listens on all of them.
     any_address: Option<u16>,
@@ -35,10 +36,11 @@ pub(crate) struct Guard {
 
 /// The address a request comes from: of the participant, if a trusted proxy passed it on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Client(pub(crate) IpAddr);
+pub struct Client(IpAddr);
 
 impl Guard {
-    pub(crate) fn new(address: SocketAddr, exposure: &Exposure) -> Self {
+    /// The guard of a server that listens on an address and is exposed like this.
+    pub fn new(address: SocketAddr, exposure: &Exposure) -> Self {
         Self {
             hosts: exposure.hosts(address),
             any_address: address.ip().is_unspecified().then(|| address.port()),
@@ -76,7 +78,10 @@ impl Guard {
     }
 
     /// Counts a session without a link, which anybody can begin.
-    pub(crate) fn begins(&self, client: Client) -> Result<(), Refusal> {
+    ///
+    /// # Errors
+    /// A [`Refusal`] after too many sessions from an address within a minute.
+    pub fn begins(&self, client: Client) -> Result<(), Refusal> {
         let mut begun = self.begun.lock().unwrap_or_else(PoisonError::into_inner);
         if begun.len() >= MOST_ADDRESSES {
             begun.retain(|_, (since, _)| since.elapsed() < WINDOW);
@@ -93,9 +98,9 @@ impl Guard {
         Err(Refusal::new(StatusCode::TOO_MANY_REQUESTS, what, "session", "wait a minute, and begin again"))
     }
 
-    /// Counts a wrong code. After [`WRONG_CODES`] different ones from an address, its guesses are refused for
-    /// a while; requests with a valid code never get here.
-    pub(crate) fn wrong_code(&self, client: Client, code: &str) -> Refusal {
+    /// Counts a wrong code. After many different ones from an address, its guesses are refused for a
+    /// while; requests with a valid code never get here.
+    pub fn wrong_code(&self, client: Client, code: &str) -> Refusal {
         let mut wrong = self.wrong.lock().unwrap_or_else(PoisonError::into_inner);
         if wrong.len() >= MOST_ADDRESSES {
             wrong.retain(|_, (since, _)| since.elapsed() < WINDOW);
@@ -114,7 +119,7 @@ impl Guard {
 }
 
 /// Refuses requests that mean another host, or come from another page.
-pub(crate) async fn check(
+pub async fn check(
     State(guard): State<Arc<Guard>>,
     ConnectInfo(peer): ConnectInfo<SocketAddr>,
     mut request: Request,
@@ -165,7 +170,7 @@ fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
 }
 
 /// Headers of every reply.
-pub(crate) async fn security_headers(request: Request, next: Next) -> Response {
+pub async fn security_headers(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     for (name, value) in [

@@ -3,7 +3,7 @@
 /// A `fastrand` generator whose seed is scrambled first (SplitMix64; Steele, Lea and Flood 2014). The first
 /// numbers that wyrand draws from seeds 1, 2, 3 … are correlated, so observers drawn from consecutive seeds
 /// would be spread more evenly than chance.
-pub(crate) fn seeded(seed: u64) -> fastrand::Rng {
+pub fn seeded(seed: u64) -> fastrand::Rng {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -2,7 +2,7 @@
 
 use super::exposure::Exposure;
 use super::patience::Patient;
-use crate::error::StudyError;
+use crate::error::PagesError;
 use axum::extract::ConnectInfo;
 use axum::{Extension, Router};
 use hyper::server::conn::http1;
@@ -41,7 +41,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// A bound address.
 #[derive(Debug)]
-pub(crate) struct Listening {
+pub struct Listening {
     listener: TcpListener,
     address: SocketAddr,
     /// Proxies stand for many.
@@ -54,22 +54,22 @@ impl Listening {
     /// they like.
     ///
     /// # Errors
-    /// [`StudyError::Listen`] if the address is in use or not of this machine.
-    pub(crate) async fn bind(address: SocketAddr, exposure: &Exposure) -> Result<Self, StudyError> {
-        let failed = |source| StudyError::Listen { address: address.to_string(), source };
+    /// [`PagesError::Listen`] if the address is in use or not of this machine.
+    pub async fn bind(address: SocketAddr, exposure: &Exposure) -> Result<Self, PagesError> {
+        let failed = |source| PagesError::Listen { address: address.to_string(), source };
         let listener = TcpListener::bind(address).await.map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         Ok(Self { listener, address, proxies: exposure.proxies.clone(), limits: LIMITS })
     }
 
     /// The bound address.
-    pub(crate) fn address(&self) -> SocketAddr {
+    pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Serves until `stop` resolves. Requests under way then have [`DRAIN_TIME`] to finish; idle and
+    /// Serves until `stop` resolves. Requests under way then have three seconds to finish; idle and
     /// half-open connections are closed.
-    pub(crate) async fn serve(self, router: Router, stop: impl Future<Output = ()> + Send) {
+    pub async fn serve(self, router: Router, stop: impl Future<Output = ()> + Send) {
         let Limits { connections, of_address, write_time } = self.limits;
         let (slots, places) = (Arc::new(Semaphore::new(connections)), Places::default());
         let graceful = GracefulShutdown::new();
