@@ -22,9 +22,6 @@ pub enum Evidence {
     Halves,
     /// A noise-free reference: in the paper a quick ray-traced one (Takouachet et al. 2017, §4.3).
     Reference,
-    /// Nothing: everything in the picture that passes the mask counts as noise. For comparison only; useless
-    /// on texture.
-    Alone,
 }
 
 /// Buffers that a thread keeps for its next tile.
@@ -259,17 +256,6 @@ impl TilePlanes {
         };
         let residual = |[shown]: [f32; 1], reference| shown - reference;
         Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
-    }
-
-    /// No evidence but the picture itself: its residual is the picture.
-    pub fn from_picture(film: &Film, display: &Display, tile: Tile) -> Self {
-        let grid = film.grid();
-        let read = |y, columns: &Columns, [picture]: [&mut [Rgb]; 1], _: &mut [f32]| {
-            for (pixel, &x) in picture.iter_mut().zip(&columns.all) {
-                *pixel = film.pixel(tile.owner(grid, x, y), y * grid.width() + x);
-            }
-        };
-        Self::gather_linear((grid.width(), grid.height()), tile, display, read, |[shown]: [f32; 1], _| shown)
     }
 }
 

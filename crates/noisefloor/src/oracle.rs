@@ -226,7 +226,6 @@ impl Oracle {
                 let reference = view.reference.ok_or_else(|| CriterionError::NoReference(self.name()))?;
                 TilePlanes::from_reference(view.film, view.display, reference, tile)
             }
-            Evidence::Alone => TilePlanes::from_picture(view.film, view.display, tile),
         };
         Ok(Some(TilePlanes { viewing: view.viewing, ..planes }))
     }
@@ -277,7 +276,6 @@ impl StoppingCriterion for Oracle {
         match self.model.evidence() {
             Evidence::Halves => Needs::HALVES,
             Evidence::Reference => Needs::REFERENCE,
-            Evidence::Alone => Needs::default(),
         }
     }
 

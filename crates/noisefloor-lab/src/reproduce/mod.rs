@@ -4,12 +4,17 @@
 //! luminances and with noise masks, with values as displayed and standardised, by four ways to choose the
 //! pairs that are asked about.
 
+mod descriptors;
+mod gram;
 mod job;
 mod outcome;
 mod pairs;
 mod protocol;
 mod report;
+mod solver;
 mod subset;
+#[cfg(test)]
+mod tests;
 
 pub use job::Reproduction;
 pub use outcome::{Count, Fingerprint, MachineResult, ProtocolOutcome, QueryCost};
@@ -21,6 +26,7 @@ pub use subset::{PairSubset, subset, write_subset};
 use crate::advance::Watch;
 use crate::error::LabError;
 use crate::files::{make_folder, write_json, write_text};
+use descriptors::luminance_pair;
 use job::Geometry;
 use noisefloor::descriptor::Descriptor;
 use pairs::Loaded;
@@ -49,7 +55,7 @@ pub fn run(
 ) -> Result<ReproductionReport, LabError> {
     make_folder(folder)?;
     let mut outcomes = Vec::new();
-    for descriptor in [noisefloor::internal::luminance_pair(job.edge), job.masks()] {
+    for descriptor in [luminance_pair(job.edge), job.masks()] {
         let loaded = job.load(&descriptor, watch)?;
         outcomes.extend(run_protocols(loaded, &descriptor, folder, on_result, watch)?);
     }

@@ -43,10 +43,7 @@ impl From<GalleryError> for Refusal {
         let do_ = match &error {
             GalleryError::Gone => "load the page again",
             GalleryError::NoSamples(_) => "type the number beside its name",
-            GalleryError::Still(StillError::Nothing) => {
-                "drop another rendering of the same view beside it, or start with --model and a model trained with \
-                 `--evidence alone`"
-            }
+            GalleryError::Still(StillError::Nothing) => "drop another rendering of the same view beside it",
             GalleryError::Still(StillError::Undecided { .. } | StillError::Dependent { .. }) => {
                 "choose it under `Scene, relation, tiles`"
             }

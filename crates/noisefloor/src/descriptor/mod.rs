@@ -7,7 +7,6 @@
 
 mod kind;
 mod mask;
-mod pair;
 mod texture;
 mod visible;
 mod windows;
@@ -16,7 +15,7 @@ pub use kind::{Described, Descriptor, DescriptorError, DescriptorKind, Descripto
 pub use mask::{NoiseMask, SigmaError};
 
 /// The built-in descriptors.
-const KINDS: [DescriptorKind; 3] = [visible::KIND, pair::MASKS, pair::LUMINANCES];
+const KINDS: [DescriptorKind; 1] = [visible::KIND];
 
 impl Descriptor {
     /// Five numbers, whatever the tile size: how many times too strong the noise is by a model of human vision,
@@ -24,19 +23,6 @@ impl Descriptor {
     /// Knows viewing conditions.
     pub fn visible() -> Self {
         Self::new(visible::Visible::default())
-    }
-
-    /// The paper's: the noise mask of the tile and of what it is compared with, pixel by pixel (Takouachet et
-    /// al. 2017, §5). 2·edge² numbers, for tiles of exactly edge×edge pixels.
-    pub fn mask_pair(mask: NoiseMask, edge: usize) -> Self {
-        Self::new(pair::MaskPair { mask, edge })
-    }
-
-    /// The paper's first attempt, without a mask, which failed: the luminance of the tile and of what it is
-    /// compared with, pixel by pixel (Takouachet et al. 2017, §4.3, §4.4). 2·edge² numbers, for tiles of
-    /// exactly edge×edge pixels.
-    pub(crate) fn luminance_pair(edge: usize) -> Self {
-        Self::new(pair::LuminancePair { edge })
     }
 
     /// The descriptor that a file names: one of `kinds`, or a built-in one.

@@ -1,4 +1,5 @@
-use noisefloor::descriptor::{Descriptor, NoiseMask};
+use super::descriptors::{luminance_pair, mask_pair};
+use noisefloor::descriptor::NoiseMask;
 use noisefloor_image::{RenderLayers, write_exr, write_png};
 use noisefloor_learn::Origin;
 use noisefloor_learn::{Corpora, TableError, describe_pairs};
@@ -38,7 +39,7 @@ fn a_pair_is_the_noisy_centre_and_the_most_converged_one() {
     corpus(folder.path());
     let folders = [folder.path().to_owned()];
     let describe = |descriptor, edge| describe_pairs(Corpora::new(&folders), descriptor, edge, 20, |_, _| ());
-    let luminances = noisefloor::internal::luminance_pair(16);
+    let luminances = luminance_pair(16);
     let table = describe(&luminances, 16).unwrap();
     let levels = &table.zones[0].levels;
 
@@ -69,12 +70,12 @@ fn a_pair_is_the_noisy_centre_and_the_most_converged_one() {
     }
 
     // The masks of the same
-    let masks = Descriptor::mask_pair(NoiseMask::default(), 16);
+    let masks = mask_pair(NoiseMask::default(), 16);
     let masks = describe(&masks, 16).unwrap();
     let converged = masks.zones[0].levels.last().unwrap();
     assert_eq!(converged.descriptor[..256], converged.descriptor[256..]);
     assert_ne!(masks.digest(), table.digest());
-    let error = describe(&noisefloor::internal::luminance_pair(32), 32).unwrap_err();
+    let error = describe(&luminance_pair(32), 32).unwrap_err();
     assert!(
         matches!(error, TableError::Descriptor { .. }) && error.to_string().contains("Wall, zone 0"),
         "{error}"
@@ -86,9 +87,7 @@ fn a_scene_with_a_reference_is_held_against_it() {
     let folder = tempfile::tempdir().unwrap();
     corpus(folder.path());
     let folders = [folder.path().to_owned()];
-    let describe = || {
-        describe_pairs(Corpora::new(&folders), &noisefloor::internal::luminance_pair(16), 16, 20, |_, _| ())
-    };
+    let describe = || describe_pairs(Corpora::new(&folders), &luminance_pair(16), 16, 20, |_, _| ());
     let alone = describe().unwrap();
 
     // 0.5 of linear light is 0.7354 on an sRGB display (IEC 61966-2-1)

@@ -4,9 +4,16 @@
 //! other: neither its kernel trait nor its fitting functions are public. For the paper's descriptor, 9,600
 //! rows of 32,768 numbers, that would take hours a machine.
 
-use super::params::{LIGHTEST, SOLVER_EPS, SvmParams, SvmTrainError, check_examples};
+use super::gram::squared_distances;
 use ndarray::{Array2, ArrayView2};
+use noisefloor::svm::Svm;
+use noisefloor_learn::{SvmParams, SvmTrainError, check_examples};
 use rayon::prelude::*;
+
+/// Duality gap at which the solver ends; LIBSVM's default, and linfa's here.
+const SOLVER_EPS: f64 = 1e-3;
+/// linfa drops support vectors lighter than this from its decision function; the same are left out here.
+const LIGHTEST: f64 = 100.0 * f64::EPSILON;
 
 /// Steps after which the solver gives up; linfa's limit.
 const MAX_STEPS: usize = 10_000_000;
@@ -15,21 +22,19 @@ const LEAST_CURVATURE: f64 = 1e-10;
 
 /// What a machine has learned of its examples.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Weights {
+pub(super) struct Weights {
     /// αᵢ·yᵢ of each example, in their order; 0 for those that are no support vectors.
-    pub alpha: Vec<f64>,
+    pub(super) alpha: Vec<f64>,
     /// ρ: subtracted from the weighted sum.
-    pub rho: f64,
+    pub(super) rho: f64,
 }
 
 /// Trains on examples whose squared distances are given, n×n and symmetric; `converged[i]` is the class of
-/// example i. What
-/// [`fit_svm`](super::fit_svm) does for long rows, for those who train several machines on parts of the same
-/// rows.
+/// example i.
 ///
 /// # Errors
 /// [`SvmTrainError`] if parameters or examples are out of range.
-pub fn fit_weights(
+pub(super) fn fit_weights(
     squared: ArrayView2<'_, f64>,
     converged: &[bool],
     params: SvmParams,
@@ -45,6 +50,26 @@ pub fn fit_weights(
         to.iter_mut().zip(from).for_each(|(to, &from): (&mut f64, _)| *to = (-params.gamma * from).exp());
     });
     Ok(solve(kernel.view(), converged, params.c))
+}
+
+/// A machine that has learned rows, one an example.
+///
+/// # Errors
+/// As of [`fit_weights`].
+pub(super) fn fit_rows(
+    rows: ArrayView2<'_, f64>,
+    converged: &[bool],
+    params: SvmParams,
+) -> Result<Svm, SvmTrainError> {
+    check_examples(rows, converged, params)?;
+    let Weights { alpha, rho } = fit_weights(squared_distances(rows, |_, _| ()).view(), converged, params)?;
+    let kept = || (0..rows.nrows()).filter(|&i| alpha[i] != 0.0);
+    Ok(Svm {
+        gamma: params.gamma as f32,
+        rho: rho as f32,
+        coefficients: kept().map(|i| alpha[i] as f32).collect(),
+        vectors: kept().flat_map(|i| rows.row(i).to_vec()).map(|v| v as f32).collect(),
+    })
 }
 
 /// Minimises ½ αᵀQα − Σα, 0 ≤ α ≤ C, Σ yα = 0, Q = yᵢyⱼK, two variables at a time, chosen by second-order
@@ -113,6 +138,8 @@ fn solve(kernel: ArrayView2<'_, f64>, converged: &[bool], c: f64) -> Weights {
 mod tests {
     use super::*;
     use ndarray::array;
+    use noisefloor_learn::fit_svm;
+    use noisefloor_testkit::Noise;
 
     fn params(c: f64) -> SvmParams {
         SvmParams { c, gamma: 0.5 }
@@ -156,5 +183,57 @@ mod tests {
             fit_weights(oblong.view(), &[true, false], params(1.0)),
             Err(SvmTrainError::Examples(_))
         ));
+    }
+
+    /// Two seeded, overlapping clouds.
+    fn clouds(examples: usize, dimensions: usize) -> (Array2<f64>, Vec<bool>) {
+        let mut noise = Noise::new(42);
+        let labels: Vec<bool> = (0..examples).map(|i| i % 2 == 0).collect();
+        let rows = Array2::from_shape_fn((examples, dimensions), |(i, _)| {
+            3.0 * noise.uniform() - 1.5 + if labels[i] { 0.5 } else { -0.5 }
+        });
+        (rows, labels)
+    }
+
+    /// The solver on a kernel matrix takes the steps that linfa's takes: the same support vectors and weights, but for
+    /// rounding, 2⁻²⁴ of them in f32.
+    #[test]
+    fn weights_equal_linfa_s() {
+        for (dimensions, c, gamma) in [
+            (20, 1.0, 0.02),
+            (20, 100.0, 0.05),
+            (20, 2.0, 2.0),
+            (20, 1e3, 1e-4),
+            (300, 2.0, 0.002),
+            (300, 2.0, 2.0),
+        ] {
+            let (rows, labels) = clouds(300, dimensions);
+            let params = SvmParams { c, gamma };
+            let ours = fit_rows(rows.view(), &labels, params).unwrap();
+            let theirs = fit_svm(rows.view(), &labels, params).unwrap();
+            assert_eq!(ours.vectors, theirs.vectors, "{params:?}");
+            let pairs = ours.coefficients.iter().zip(&theirs.coefficients);
+            let worst = pairs.map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max);
+            let rho = f64::from((ours.rho - theirs.rho).abs());
+            assert!(worst < 1e-6 * c && rho < 1e-6 * c.max(1.0), "{params:?}: {worst}, {rho}");
+        }
+    }
+
+    /// What a matrix product saves: `cargo test --release -p noisefloor-lab long_rows -- --ignored --nocapture`.
+    #[test]
+    #[ignore = "measures time"]
+    #[expect(clippy::print_stdout, clippy::disallowed_methods, reason = "it measures time")]
+    fn long_rows() {
+        let (rows, labels) = clouds(600, 32_768);
+        let rows = rows.mapv(|v| v / (32_768f64).sqrt());
+        for (name, fit) in [("linfa", fit_svm as fn(_, &[bool], _) -> _), ("here", fit_rows)] {
+            let begun = std::time::Instant::now();
+            let svm: Svm = fit(rows.view(), &labels, SvmParams::PAPER).unwrap();
+            println!(
+                "{name}: {:.2} s, {} support vectors",
+                begun.elapsed().as_secs_f64(),
+                svm.coefficients.len()
+            );
+        }
     }
 }

@@ -14,7 +14,7 @@ const PANEL: usize = 2048;
 ///
 /// From ‖x‖² + ‖y‖² − 2x·y of rows less their mean, which keeps cancellation small: within (2d + 16)·u·(‖x‖²
 /// + ‖y‖²) for rows of d numbers, u = 2⁻⁵³.
-pub fn squared_distances<T: Copy + Into<f64> + Send + Sync>(
+pub(super) fn squared_distances<T: Copy + Into<f64> + Send + Sync>(
     rows: ArrayView2<'_, T>,
     on_block: impl Fn(usize, usize) + Sync,
 ) -> Array2<f64> {
