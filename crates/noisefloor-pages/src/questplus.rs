@@ -7,9 +7,9 @@
 use std::sync::Arc;
 
 /// Probability of a correct answer by pure guessing between two intervals.
-pub const GUESS: f64 = 0.5;
+pub(crate) const GUESS: f64 = 0.5;
 /// Assumed probability of an answer given without looking.
-pub const LAPSE: f64 = 0.02;
+pub(crate) const LAPSE: f64 = 0.02;
 /// Candidate scales of the psychometric function, in ln(spp).
 const SCALES: [f64; 4] = [0.08, 0.16, 0.32, 0.64];
 /// Number of candidate thresholds, evenly spaced in ln(spp).
@@ -100,7 +100,7 @@ impl QuestPlus {
     }
 
     /// Starts with ln(threshold) normal about 0 with this standard deviation.
-    pub fn about_zero(grid: Arc<QuestGrid>, sd: f64) -> Self {
+    pub(crate) fn about_zero(grid: Arc<QuestGrid>, sd: f64) -> Self {
         let prior: Vec<f64> = grid.thresholds.iter().map(|t| (-0.5 * (t / sd).powi(2)).exp()).collect();
         let sum: f64 = prior.iter().sum();
         Self { grid, posterior: prior.into_iter().map(|p| p / sum).collect() }

@@ -121,12 +121,6 @@ impl Conditions {
             None
         }
     }
-
-    /// Whether both are about the same screen at the same zoom, so that the card need not be measured again.
-    pub fn same_screen(&self, other: &Self) -> bool {
-        let screen = |c: &Self| (c.pixel_ratio, c.screen_width, c.screen_height, c.colour_depth);
-        screen(self) == screen(other)
-    }
 }
 
 /// A condition outside the limits of a study.

@@ -58,7 +58,7 @@ pub mod store;
 
 pub use code::parse as parse_code;
 pub use config::{
-    AnswerOption, MAX_STACKS, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
+    AnswerOption, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
 };
 pub use error::{StoreError, StudyError};
 pub use event::{Choice, Envelope, StudyEvent, TrialTiming};
@@ -70,6 +70,6 @@ pub use session::{
     CatchKind, Class, EventMisfit, Haste, ParticipantSession, Plan, Stage, Trial, TrialOutcome, TrialRole,
     grids, replay,
 };
-pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
+pub use stack::StudyStack;
 pub use stack_render::render_stack;
 pub use store::{AnswerStore, NewSession, SessionRecord};

@@ -98,12 +98,12 @@ impl SourceKind {
     }
 
     /// Whether it renders at the size asked for; pictures have theirs.
-    pub fn takes_size(&self) -> bool {
+    pub(crate) fn takes_size(&self) -> bool {
         !matches!(self, Self::Exr)
     }
 
     /// Whether it can be told the longest path.
-    pub fn takes_depth(&self) -> bool {
+    pub(crate) fn takes_depth(&self) -> bool {
         match self {
             Self::Ptwne(_) => true,
             Self::Exr => false,

@@ -15,7 +15,7 @@ mod plots;
 mod quality;
 mod race;
 
-pub use denoising::{AfterDenoising, DENOISED_LIMIT};
+pub use denoising::AfterDenoising;
 pub use files::{write_page, write_scene};
 pub use kept::{Converged, ReferenceJob, render_reference};
 pub use outcome::{Comparison, CriterionRun, CurvePoint, Labels, TileStop};

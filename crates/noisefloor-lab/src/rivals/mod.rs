@@ -170,7 +170,7 @@ impl RatedRival {
 }
 
 /// Mean thresholds of people and of a predictor, scene by scene; censored ones stay out.
-pub fn scene_means(predictions: &[Prediction]) -> Vec<SceneMean> {
+pub(crate) fn scene_means(predictions: &[Prediction]) -> Vec<SceneMean> {
     let mut scenes: Vec<&str> = predictions.iter().map(|p| p.scene.as_str()).collect();
     scenes.dedup();
     let of = |scene: &str| {

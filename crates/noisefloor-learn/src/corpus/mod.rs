@@ -23,7 +23,7 @@ mod zone;
 pub use error::CorpusError;
 pub use levels::{Encoding, Inner, JudgedImage, JudgedImages, Patch, zone_levels};
 
-pub use zone::{CENSORED_SPP, JudgedZone, ZoneImages};
+pub use zone::{JudgedZone, ZoneImages};
 
 use noisefloor_image::{batches, running_means};
 use std::path::Path;
@@ -104,7 +104,7 @@ impl Corpus {
     /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if the reference cannot be
     /// read,
     /// [`CorpusError::Zone`] if a zone lies outside it.
-    pub fn scene_reference(&self, scene: &str) -> Result<Option<Vec<Patch>>, CorpusError> {
+    pub(crate) fn scene_reference(&self, scene: &str) -> Result<Option<Vec<Patch>>, CorpusError> {
         levels::reference(&self.scene_zones(scene)?)
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// A threshold at or above this many samples per pixel is censored: observers were offered no more.
-pub const CENSORED_SPP: f64 = 10_000.0;
+pub(crate) const CENSORED_SPP: f64 = 10_000.0;
 
 /// Where the images of a zone are.
 #[derive(Clone, Debug, PartialEq, Eq)]

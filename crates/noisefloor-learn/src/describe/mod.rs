@@ -214,7 +214,7 @@ pub(crate) fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: &Descriptor
 
 /// Standard deviation of the noise mask (σ = 1) of the luminance residual over a zone, less known rounding
 /// noise; in display values. The constant-noise baseline goes by it.
-pub fn noise_level(planes: &TilePlanes) -> f32 {
+pub(crate) fn noise_level(planes: &TilePlanes) -> f32 {
     let (mask, t) = (NoiseMask::default(), planes.inner);
     let plane = mask.apply(&planes.residual);
     let inner = plane.slice(ndarray::s![t.y..t.y + t.height, t.x..t.x + t.width]);

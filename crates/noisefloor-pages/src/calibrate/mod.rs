@@ -15,4 +15,4 @@ pub use simulate::SimulatedEyes;
 pub use tiles::{CalibrationTile, EDGE};
 
 /// Pictures of a trial. With four, an answer says twice as much about a threshold as with two.
-pub const CHOICES: usize = 4;
+pub(crate) const CHOICES: usize = 4;

@@ -84,7 +84,7 @@ impl Observer {
     }
 
     /// Whether the observer answered anything that counts.
-    pub fn has_answers(&self) -> bool {
+    pub(crate) fn has_answers(&self) -> bool {
         self.clicks > 0 || !self.stops.is_empty() || self.stage == Stage::ScreenedOut
     }
 

@@ -67,7 +67,7 @@ fn blind(observer: &Observer) -> Option<String> {
 
 /// Why each observer is excluded; empty for those who count. Rules that compare observers look only at those
 /// who break none by themselves: a few who click at random must not hide each other.
-pub fn exclusions(observers: &[Observer], study: &Study) -> Vec<Vec<String>> {
+pub(crate) fn exclusions(observers: &[Observer], study: &Study) -> Vec<Vec<String>> {
     let mut reasons: Vec<Vec<String>> = observers.iter().map(|o| individual(o, study)).collect();
     let mut seen = BTreeSet::new();
     for (observer, reasons) in observers.iter().zip(&mut reasons) {

@@ -5,4 +5,4 @@ mod rules;
 mod study;
 
 pub use rules::{AnswerOption, Participants, Question, QuestionKind, Screening, StudyProtocol, Texts};
-pub use study::{MAX_STACKS, Study};
+pub use study::Study;

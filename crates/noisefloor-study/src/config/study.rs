@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Longest study file, in bytes.
 const MAX_FILE: u64 = 1 << 20;
 /// Most stacks of a study.
-pub const MAX_STACKS: usize = 200;
+pub(crate) const MAX_STACKS: usize = 200;
 /// Most groups of observers, questions, and answers of a choice.
 const MAX_ENTRIES: usize = 40;
 /// Most showings of a pair to one observer.

@@ -18,7 +18,7 @@ mod verdicts;
 
 pub use answers::{Disagreement, Disagreements, TileAnswer, read_answers};
 pub use app::ExploreSetup;
-pub use gallery::{GalleryPicture, MAX_GALLERY_PIXELS, MAX_PICTURES};
+pub use gallery::GalleryPicture;
 pub use learn::{AnswerAgreement, LearnStep, Learned, retrain};
 pub use line::{PersonalLine, fit_line};
 

@@ -21,12 +21,12 @@ impl ParticipantSession {
     }
 
     /// Whether the observer is simulated.
-    pub fn is_simulated(&self) -> bool {
+    pub(crate) fn is_simulated(&self) -> bool {
         self.simulated
     }
 
     /// Whether the observer has paused.
-    pub fn is_paused(&self) -> bool {
+    pub(crate) fn is_paused(&self) -> bool {
         self.paused
     }
 
