@@ -6,7 +6,7 @@ use crate::display::ToneMapping;
 use crate::evidence::Evidence;
 use crate::oracle::Spread;
 use crate::params::Audience;
-use crate::svm::{Classifier, Machine, platt::from_log_odds};
+use crate::svm::{Classifier, Machine, from_log_odds};
 use noisefloor_vision::{Eotf, Primaries, Viewing, ViewingError, ViewingParams};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

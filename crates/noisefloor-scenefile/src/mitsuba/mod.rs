@@ -1,29 +1,19 @@
 //! Mitsuba XML, versions 0.5 to 3.
 //!
 //! `markup` splits text into tags, `document` makes a tree of the files, with includes and parameters
-//! resolved; `context` follows references and notes what nobody has read, which becomes warnings; `values`,
-//! `colours` and `transforms` read the leaves. Each part of a scene has a module. The README lists what is
-//! read. Errors of shapes and emitters are collected, so that one load names all.
+//! resolved; `context` follows references, reads numbers, points and transforms, and notes what nobody has read,
+//! which becomes warnings. Each part of a scene has a module. The README lists what is read. Errors of shapes and
+//! emitters are collected, so that one load names all.
 
-mod attributes;
 mod bsdfs;
 mod colours;
 mod context;
 mod document;
 mod emitters;
-mod filling;
-mod glossy;
-mod groups;
 mod markup;
-mod points;
-mod principled;
-mod raster;
 mod sensor;
 mod shapes;
-mod surface;
 mod textures;
-mod transforms;
-mod values;
 mod xml;
 
 use crate::Loaded;
@@ -31,9 +21,9 @@ use crate::error::{Errors, LoadError, Place};
 use crate::options::LoadOptions;
 use context::Context;
 use document::Document;
-use filling::Filling;
 use noisefloor_ptwne::SceneBuilder;
 use sensor::View;
+use shapes::Filling;
 use std::path::Path;
 
 /// Loads the scene in `path`.

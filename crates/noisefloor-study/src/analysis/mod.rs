@@ -5,12 +5,9 @@
 //! results; [`files`] writes them.
 
 mod agreement;
-mod classes;
 pub mod files;
 pub mod fit;
-mod groups;
 pub mod interval;
-mod listing;
 pub mod observers;
 mod plots;
 pub mod raw;
@@ -21,9 +18,6 @@ mod summary;
 pub mod tiles;
 
 pub use agreement::{BetweenObservers, RepeatAgreement};
-pub use classes::ClassRow;
-pub use groups::GroupLine;
-pub use listing::ObserverRow;
 pub use observers::Observer;
-pub use report::{AnalysisOptions, StudyReport, analyse, report};
+pub use report::{AnalysisOptions, ClassRow, GroupLine, ObserverRow, StudyReport, analyse, report};
 pub use tiles::{CorpusThreshold, TileRow};

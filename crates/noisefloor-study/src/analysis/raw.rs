@@ -4,7 +4,7 @@
 //! Participants are numbered in the order they began. Their codes, with which answers can be erased, and the
 //! identifiers from their addresses are left out.
 
-use super::listing::ObserverRow;
+use super::report::ObserverRow;
 use super::report::StudyReport;
 use crate::config::Study;
 use crate::error::{StoreError, StudyError};

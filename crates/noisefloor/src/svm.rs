@@ -1,4 +1,5 @@
-//! Prediction over extracted support vectors, in f32 and without allocation.
+//! What decides, a line or a support vector machine, and how sure it is. In f32 and without allocation; the crate
+//! `noisefloor-learn` trains both.
 
 use serde::{Deserialize, Serialize};
 
@@ -97,6 +98,115 @@ fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
+// A straight line through scaled numbers.
+
+/// What logistic regression learns: the decision value w·x + b.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// w, one weight for each scaled number.
+    pub weights: Vec<f32>,
+    /// b.
+    pub bias: f32,
+}
+
+impl Line {
+    /// Decision value of a scaled descriptor: positive for "converged".
+    ///
+    /// # Panics
+    /// If `x` has not as many numbers as there are weights.
+    pub fn decision(&self, x: &[f32]) -> f32 {
+        assert_eq!(x.len(), self.weights.len(), "numbers in the descriptor");
+        let sum: f64 = self.weights.iter().zip(x).map(|(w, x)| f64::from(*w) * f64::from(*x)).sum();
+        (sum + f64::from(self.bias)) as f32
+    }
+}
+
+// From decision values to probabilities.
+
+/// Platt's sigmoid P = 1/(1 + exp(a·f + b)) of a decision value f (Platt 1999).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Platt {
+    /// Slope; negative where larger decision values are more likely "converged".
+    pub a: f32,
+    /// Offset.
+    pub b: f32,
+}
+
+impl Platt {
+    /// Probability in [0, 1].
+    pub fn probability(&self, decision: f32) -> f32 {
+        from_log_odds(self.log_odds(decision))
+    }
+
+    /// ln(P/(1 − P)).
+    pub fn log_odds(&self, decision: f32) -> f64 {
+        -(f64::from(self.a) * f64::from(decision) + f64::from(self.b))
+    }
+}
+
+pub(crate) fn from_log_odds(log_odds: f64) -> f32 {
+    (1.0 / (1.0 + (-log_odds).exp())) as f32
+}
+
+// From raw descriptors to probabilities.
+
+/// What decides on scaled descriptors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Machine {
+    /// A straight line, by logistic regression: the bundled model's.
+    Line(Line),
+    /// A support vector machine: the paper's.
+    Svm(Svm),
+}
+
+impl Machine {
+    /// What it is called: `line` or `svm`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Line(_) => "line",
+            Self::Svm(_) => "svm",
+        }
+    }
+
+    /// Decision value of a scaled descriptor: positive for "converged".
+    ///
+    /// # Panics
+    /// If `x` does not have the machine's dimensionality.
+    pub fn decision(&self, x: &[f32]) -> f32 {
+        match self {
+            Self::Line(line) => line.decision(x),
+            Self::Svm(svm) => svm.decision(x),
+        }
+    }
+}
+
+/// Scaling, machine and calibration, as they were trained together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Classifier {
+    /// From raw to scaled descriptors.
+    pub scaler: Scaler,
+    /// The machine.
+    pub machine: Machine,
+    /// From decision values to probabilities.
+    pub platt: Platt,
+}
+
+impl Classifier {
+    /// Probability in [0, 1] that the mean observer sees no difference.
+    ///
+    /// # Panics
+    /// If `raw` does not have the machine's dimensionality.
+    pub fn probability(&self, raw: &[f32]) -> f32 {
+        from_log_odds(self.log_odds_in_place(&mut raw.to_vec()))
+    }
+
+    /// The log-odds of that, for a descriptor that is scaled in place.
+    pub(crate) fn log_odds_in_place(&self, raw: &mut [f32]) -> f64 {
+        self.scaler.apply(raw);
+        self.platt.log_odds(self.machine.decision(raw))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,5 +240,12 @@ mod tests {
             let exact: f64 = v.iter().map(|&(a, b)| f64::from(a - b).powi(2)).sum();
             prop_assert!((f64::from(squared_distance(&a, &b)) - exact).abs() <= 1e-5 * exact.max(1.0));
         }
+    }
+
+    #[test]
+    fn is_a_rising_sigmoid() {
+        let platt = Platt { a: -2.0, b: 1.0 };
+        assert!((platt.probability(0.5) - 0.5).abs() < 1e-6);
+        assert!(platt.probability(1e9) == 1.0 && platt.probability(-1e9) == 0.0);
     }
 }
