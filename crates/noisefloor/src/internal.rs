@@ -3,7 +3,7 @@
 
 mod text;
 
-pub use crate::container::{Fault, Format};
+pub use crate::container::{FileFault, Format};
 pub use crate::display::ROUNDING_LUMINANCE;
 pub use crate::evidence::HALO;
 pub use crate::model::familiarity::nearest;

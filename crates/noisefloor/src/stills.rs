@@ -398,8 +398,8 @@ fn ratio_of_brightness(one: &Still, other: &Still) -> Option<f64> {
     let light = |still: &Still, pixel: usize| f64::from(luminance(still.pixels[pixel]));
     let (mut sums, mut squares, mut ratios) = ([0.0; 2], 0.0, Vec::new());
     for block in blocks(one.size) {
-        let of = |still: &Still| block.iter().map(|&pixel| light(still, pixel)).sum::<f64>();
-        let (a, b) = (of(one), of(other));
+        let sum = |still: &Still| block.iter().map(|&pixel| light(still, pixel)).sum::<f64>();
+        let (a, b) = (sum(one), sum(other));
         squares += block.iter().map(|&p| (light(one, p) - light(other, p)).powi(2)).sum::<f64>();
         (sums[0], sums[1]) = (sums[0] + a, sums[1] + b);
         // Black in both says nothing

@@ -173,7 +173,7 @@ impl RatedRival {
 pub(crate) fn scene_means(predictions: &[Prediction]) -> Vec<SceneMean> {
     let mut scenes: Vec<&str> = predictions.iter().map(|p| p.scene.as_str()).collect();
     scenes.dedup();
-    let of = |scene: &str| {
+    let means = |scene: &str| {
         let known = || predictions.iter().filter(|p| p.scene == scene && !p.censored);
         SceneMean {
             scene: scene.to_owned(),
@@ -181,7 +181,7 @@ pub(crate) fn scene_means(predictions: &[Prediction]) -> Vec<SceneMean> {
             predicted_spp: mean(known().map(|p| p.predicted_spp)),
         }
     };
-    scenes.into_iter().map(of).collect()
+    scenes.into_iter().map(means).collect()
 }
 
 /// Mean of numbers; NaN of none.

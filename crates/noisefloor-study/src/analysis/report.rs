@@ -145,12 +145,12 @@ pub struct GroupLine {
 
 /// Lines from the first group of the study to every other group with observers.
 fn group_lines(study: &Study, observers: &[&Observer]) -> Vec<GroupLine> {
-    let of =
+    let members =
         |group: &str| -> Vec<&Observer> { observers.iter().copied().filter(|o| o.group == group).collect() };
     let Some((first, others)) = study.groups.split_first() else { return Vec::new() };
-    let base = of(first);
+    let base = members(first);
     let line = |group: &String| {
-        let group_observers = of(group);
+        let group_observers = members(group);
         if base.is_empty() || group_observers.is_empty() {
             return None;
         }

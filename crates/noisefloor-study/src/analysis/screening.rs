@@ -54,9 +54,9 @@ pub fn individual(observer: &Observer, study: &Study) -> Vec<String> {
 /// Why the answers of a validation do not depend on the stimulus.
 fn blind(observer: &Observer) -> Option<String> {
     let share = |class: Class| {
-        let of = || observer.judged.iter().filter(|(_, c, _)| *c == class);
-        let identical = of().filter(|(.., identical)| *identical).count();
-        (of().count() > 0).then(|| identical as f64 / of().count() as f64)
+        let judged = || observer.judged.iter().filter(|(_, c, _)| *c == class);
+        let identical = judged().filter(|(.., identical)| *identical).count();
+        (judged().count() > 0).then(|| identical as f64 / judged().count() as f64)
     };
     let (reference, noisy) = (share(Class::Reference)?, share(Class::Noisy)?);
     (noisy >= reference).then(|| {
