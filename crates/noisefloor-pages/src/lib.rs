@@ -1,5 +1,7 @@
 //! What noisefloor shows in the browser without a database: `noisefloor-study` builds on it.
 //!
+//! This crate serves the commands: any release may change its interface.
+//!
 //! - [`http`] is the server of all pages: connections within limits, checks of every request, refusals.
 //! - [`watch`] shows a render while it runs.
 //! - [`calibrate`] measures how many samples one's own eyes need, in two minutes.

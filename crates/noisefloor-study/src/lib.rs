@@ -1,5 +1,7 @@
 //! Experiments with people, in the browser: noise thresholds are collected, validated and analysed.
 //!
+//! This crate serves the commands: any release may change its interface.
+//!
 //! - [`Study`] is a checked study file: stacks of pictures, a protocol, what observers read and agree to.
 //! - [`StudyServer`] shows it to observers and keeps every [`StudyEvent`] before it acknowledges it;
 //!   [`store`] is where.
