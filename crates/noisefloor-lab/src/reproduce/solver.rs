@@ -222,7 +222,6 @@ mod tests {
     /// What a matrix product saves: `cargo test --release -p noisefloor-lab long_rows -- --ignored --nocapture`.
     #[test]
     #[ignore = "measures time"]
-    #[expect(clippy::print_stdout, clippy::disallowed_methods, reason = "it measures time")]
     fn long_rows() {
         let (rows, labels) = clouds(600, 32_768);
         let rows = rows.mapv(|v| v / (32_768f64).sqrt());
