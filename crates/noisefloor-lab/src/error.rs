@@ -65,7 +65,7 @@ pub enum LabError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A plot could not be drawn.

@@ -12,7 +12,7 @@ pub enum PagesError {
     Listen {
         /// The address.
         address: String,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A language file, or the folder of them, cannot be read.
@@ -20,7 +20,7 @@ pub enum PagesError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A language file is invalid.

@@ -254,12 +254,12 @@ impl Loader<'_> {
         self.has_data(primitive, place)?;
         let corners = mesh::corners(self.asset, primitive, place)?;
         let (builder, notes) = (&mut self.builder, &mut self.notes);
-        let look = self.materials.look(primitive.material, corners, place, builder, notes)?;
-        let shines = look.emission.is_some();
+        let material = self.materials.material(primitive.material, corners, place, builder, notes)?;
+        let shines = material.emission.is_some();
         if shines && in_object {
             return Ok(true);
         }
-        let mut triangles = mesh::triangles(self.asset, primitive, mode, &look, place)?;
+        let mut triangles = mesh::triangles(self.asset, primitive, mode, &material, place)?;
         if triangles.indices.is_empty() {
             if first && mesh::attribute(primitive, Semantic::Positions).is_some() {
                 self.notes.warn(place, "it has no whole triangle");
@@ -267,7 +267,7 @@ impl Loader<'_> {
             return Ok(false);
         }
         let count = triangles.positions.len();
-        for (set, uvs) in look.sets.iter().zip([&mut triangles.uvs, &mut triangles.second_uvs]) {
+        for (set, uvs) in material.sets.iter().zip([&mut triangles.uvs, &mut triangles.second_uvs]) {
             if let Some(set) = set.filter(|_| uvs.is_empty()) {
                 if first {
                     let what = format_args!("it has no set {set} of texture coordinates: all are 0");
@@ -281,7 +281,7 @@ impl Loader<'_> {
             let p = DVec3::from_array(p.map(f64::from));
             self.bounds = [self.bounds[0].min(p), self.bounds[1].max(p)];
         }
-        self.needs_light |= !look.unlit;
+        self.needs_light |= !material.unlit;
         let mesh = Mesh {
             positions: &triangles.positions,
             normals: &triangles.normals,
@@ -292,7 +292,7 @@ impl Loader<'_> {
             tangents: &triangles.tangents,
             indices: &triangles.indices,
         };
-        match self.builder.mesh(&mesh, look.id, look.emission) {
+        match self.builder.mesh(&mesh, material.id, material.emission) {
             Ok(0) => {}
             Ok(count) => {
                 if first {

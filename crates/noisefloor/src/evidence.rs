@@ -26,7 +26,7 @@ pub enum Evidence {
 
 /// Buffers that a thread keeps for its next tile.
 #[derive(Default)]
-struct Room {
+struct Buffers {
     planes: [Vec<f32>; 2],
     columns: Columns,
     scratch: Scratch,
@@ -60,7 +60,7 @@ struct Scratch {
 }
 
 thread_local! {
-    static ROOM: RefCell<Room> = RefCell::default();
+    static BUFFERS: RefCell<Buffers> = RefCell::default();
 }
 
 /// A tile as displayed, and its noise. All planes are display-encoded and have the same shape (rows,
@@ -152,7 +152,7 @@ impl TilePlanes {
     ) -> Self {
         let padded = |edge: usize| edge.next_multiple_of(HALO) + 2 * HALO;
         let shape = (padded(tile.height), padded(tile.width));
-        let Room { planes: [mut image, mut residual], mut columns, mut scratch } = ROOM.take();
+        let Buffers { planes: [mut image, mut residual], mut columns, mut scratch } = BUFFERS.take();
         image.resize(shape.0 * shape.1, 0.0);
         residual.resize(shape.0 * shape.1, 0.0);
         columns.all.clear();
@@ -162,7 +162,7 @@ impl TilePlanes {
         for (place, (image, residual)) in rows.enumerate() {
             row(mirror(tile.y + place, height), &columns, &mut scratch, image, residual);
         }
-        ROOM.set(Room { planes: Default::default(), columns, scratch });
+        BUFFERS.set(Buffers { planes: Default::default(), columns, scratch });
         let [image, residual] =
             [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
         let inner = Tile { x: HALO, y: HALO, ..tile };
@@ -172,7 +172,7 @@ impl TilePlanes {
     /// Returns its memory to this thread's buffers, so that the next verdict does not allocate.
     pub(crate) fn recycle(self) {
         let planes = [self.image, self.residual].map(|plane| plane.into_raw_vec_and_offset().0);
-        ROOM.with_borrow_mut(|room| room.planes = planes);
+        BUFFERS.with_borrow_mut(|buffers| buffers.planes = planes);
     }
 
     /// Evidence from the film's two halves.

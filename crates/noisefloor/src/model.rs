@@ -55,7 +55,7 @@ pub enum ModelError {
     #[error("the model announces {0} bytes, more than the limit of {MAX_PAYLOAD}")]
     Oversized(u64),
     /// The content contradicts itself.
-    #[error("the model does not hold together: {0}")]
+    #[error("the model contradicts itself: {0}")]
     Invalid(String),
     /// The model was trained with another version of the descriptor than this release computes.
     #[error(

@@ -77,12 +77,12 @@ impl Lights {
     #[inline]
     pub(crate) fn prospect(&self, receiver: Receiver) -> Prospect {
         let mut prospect = Prospect::unknown(receiver);
-        self.look(&mut prospect);
+        self.weigh(&mut prospect);
         prospect
     }
 
     #[inline]
-    fn look(&self, prospect: &mut Prospect) {
+    fn weigh(&self, prospect: &mut Prospect) {
         if self.only.is_some() {
             return;
         }

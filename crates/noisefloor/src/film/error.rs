@@ -29,7 +29,7 @@ pub enum FilmError {
         now: u64,
     },
     /// The system has less memory for a film than it would take.
-    #[error("a film of {width}×{height} pixels takes {bytes} bytes of memory, which are not to be had")]
+    #[error("a film of {width}×{height} pixels takes {bytes} bytes of memory, more than there is")]
     Memory {
         /// Width of the picture.
         width: usize,

@@ -39,7 +39,7 @@ pub(super) struct TileWatch {
     pub(super) repeated: bool,
     /// Whether values by themselves differ from batch to batch by more than rounding: they have noise.
     pub(super) varies: bool,
-    /// What was found since the last look.
+    /// What was found since the last check.
     pub(super) sums: Sums,
     /// What the values of the first group have in common.
     pub(super) values: Values,
