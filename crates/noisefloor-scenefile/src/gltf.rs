@@ -7,12 +7,10 @@ mod accessor;
 mod asset;
 mod camera;
 mod clearcoat;
-mod daylight;
 #[cfg(feature = "draco")]
 mod draco;
 mod gloss;
 mod light;
-mod lit;
 mod material;
 mod mesh;
 mod meshopt;
@@ -102,10 +100,10 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
         let sky = match scene.lights() {
             0 => {
                 notes.warn(&whole, format_args!("it has no light: {DAYLIGHT}"));
-                Some(daylight::daylight(&camera))
+                Some(light::daylight(&camera))
             }
             _ => {
-                let sky = lit::missing_daylight(&scene, &camera);
+                let sky = light::missing_daylight(&scene, &camera);
                 if sky.is_some() {
                     let what = format_args!("its own lights show next to nothing of it: {DAYLIGHT}");
                     notes.warn(&whole, what);
