@@ -75,7 +75,7 @@ fn mark(zone: &Prediction, places: &Places) -> Option<TileMark> {
     })
 }
 
-/// Writes `zones-SCENE.png` of [`map_zones`], `thresholds.svg` and `reliability.svg` into the folder, which
+/// Writes `zones-SCENE.png` of each scene, `thresholds.svg` and `reliability.svg` into the folder, which
 /// is made. `bins` is the reliability curve.
 ///
 /// # Errors

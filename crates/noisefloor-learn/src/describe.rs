@@ -51,7 +51,7 @@ impl<'a> Corpora<'a> {
 /// Describes every zone of the corpora, by the evidence given. `on_zone(done, all)` reports progress. The
 /// zones of a scene are its picture.
 ///
-/// [`Evidence::Reference`] holds pictures against the scene's reference ([`Corpus::scene_reference`]); where
+/// [`Evidence::Reference`] holds pictures against the scene's reference (`reference.exr`); where
 /// it has none, the most converged picture stands in for it.
 ///
 /// # Errors

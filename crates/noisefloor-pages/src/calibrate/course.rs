@@ -30,7 +30,7 @@ const ATTENTIVE: f64 = 0.8;
 /// A factor is beyond what can be measured where so much of the posterior lies beyond the levels.
 const BEYOND: f64 = 0.5;
 
-/// What is shown: [`CHOICES`] pictures, of which one has noise.
+/// What is shown: four pictures, of which one has noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationTrial {
     /// Its number, from 0.
@@ -39,7 +39,7 @@ pub struct CalibrationTrial {
     pub tile: usize,
     /// Samples per pixel of the noisy picture.
     pub spp: f64,
-    /// Which of the pictures is the noisy one, below [`CHOICES`].
+    /// Which of the pictures is the noisy one, from 0.
     pub noisy: usize,
     /// Whether the noise is so strong that whoever looks finds it.
     pub easy: bool,
