@@ -52,7 +52,7 @@ function text(at) {
 /** Memory for the length of a call: `use(pointer)`. */
 function withMemory(bytes, use) {
   const at = loaded().nf_alloc(bytes);
-  if (!at) throw new NoisefloorError("MEMORY", `${bytes} bytes of memory are not to be had`);
+  if (!at) throw new NoisefloorError("MEMORY", `there is no memory for ${bytes} bytes`);
   try {
     return use(at);
   } finally {

@@ -136,7 +136,7 @@ pub(crate) fn memory(grid: TileGrid, bytes_a_pixel: usize) -> Result<(), Failure
     let bytes = width * height * bytes_a_pixel;
     Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
         let what =
-            format!("work on {width}x{height} pixels takes {bytes} bytes of memory, which are not to be had");
+            format!("work on {width}x{height} pixels takes {bytes} bytes of memory, more than there is");
         Failure::new(NfStatus::Memory, what)
     })
 }

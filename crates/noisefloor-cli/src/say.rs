@@ -20,7 +20,7 @@ impl std::error::Error for NotSaid {}
 
 impl NotSaid {
     /// Whoever read our output has had enough (`noisefloor scenes | head -1`): that is no fault.
-    pub fn nobody_reads(&self) -> bool {
+    pub(crate) fn nobody_reads(&self) -> bool {
         self.0.kind() == io::ErrorKind::BrokenPipe
     }
 }

@@ -38,7 +38,7 @@ impl JobPath {
     }
 
     /// What is in front of {frame}, if that is there once, and nothing of the kind after it.
-    pub fn before_frame(&self) -> Option<PathBuf> {
+    pub(crate) fn before_frame(&self) -> Option<PathBuf> {
         let (before, _, after) = placeholder(self.0.as_os_str().as_encoded_bytes())?;
         placeholder(after).is_none().then(|| path(before.to_vec()))
     }

@@ -165,7 +165,7 @@ struct Eyes<'a> {
 }
 
 impl Eyes<'_> {
-    /// JODs lost by an error of so many times its strength. What cannot be compared stays open.
+    /// JODs lost by an error of so many times its strength. A tile that cannot be compared stays open.
     fn lost(&mut self, error: &DenoisedError, contrast: f64) -> f64 {
         error.jods_lost_at(contrast as f32, self.model, self.room).unwrap_or(10.0)
     }

@@ -1,7 +1,7 @@
 //! What can go wrong with shards and farms. Every message says what, where, and what to do.
 
 use noisefloor::{
-    SessionError, SourceError, checkpoint::CheckpointError, internal::Fault, source::IdentityChange,
+    SessionError, SourceError, checkpoint::CheckpointError, internal::FileFault, source::IdentityChange,
     tile::TileError,
 };
 use noisefloor_image::WriteError;
@@ -51,14 +51,14 @@ pub enum ShardError {
     Tile(#[from] TileError),
 }
 
-impl From<Fault> for ShardError {
-    fn from(fault: Fault) -> Self {
+impl From<FileFault> for ShardError {
+    fn from(fault: FileFault) -> Self {
         match fault {
-            Fault::Io(error) => Self::Io(error),
-            Fault::Foreign => Self::Foreign,
-            Fault::Version(found) => Self::Version(found),
-            Fault::Damaged(what) => Self::Damaged(what),
-            Fault::Oversized(bytes) => {
+            FileFault::Io(error) => Self::Io(error),
+            FileFault::Foreign => Self::Foreign,
+            FileFault::Version(found) => Self::Version(found),
+            FileFault::Damaged(what) => Self::Damaged(what),
+            FileFault::Oversized(bytes) => {
                 Self::Damaged(format!("its header has {bytes} bytes, more than the limit of {MAX_HEADER}"))
             }
         }

@@ -1,5 +1,7 @@
 //! A frame or a sequence over many machines.
 //!
+//! This crate serves the commands: any release may change its interface.
+//!
 //! - A [`Shard`] is a file of batches, each the samples of one tile in one range
 //!   ([`PlannedBatch`]). It says which job they are of ([`ShardJob`]).
 //! - [`sample`] takes the samples of a shard; [`split`] divides work into tasks of about equal length.

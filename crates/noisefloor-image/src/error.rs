@@ -14,7 +14,7 @@ pub enum PictureError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// Not the expected format.
@@ -156,7 +156,7 @@ pub enum WriteError {
         path: PathBuf,
         /// Its folder.
         folder: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The path names something that a file must not replace.
@@ -221,7 +221,7 @@ pub enum StackError {
     Folder {
         /// The folder.
         dir: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// An image of the stack cannot be read.
@@ -229,7 +229,7 @@ pub enum StackError {
     Unreadable {
         /// The image.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// No image in the folder is named as one of a stack.

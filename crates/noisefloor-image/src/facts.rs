@@ -67,17 +67,17 @@ fn of_header(header: &Header) -> SampleFacts {
         return SampleFacts { samples: even, origin: None };
     };
     let text = text.to_string();
-    let said = |name: &str| {
+    let stated = |name: &str| {
         let lines = text.lines().filter(|_| text.len() <= MAX_TEXT);
         lines.filter_map(|line| line.split_once('=')).find(|(n, _)| *n == name).map(|(_, value)| value)
     };
-    let count = |name| said(name)?.parse().ok().filter(|&n: &u64| n > 0);
+    let count = |name| stated(name)?.parse().ok().filter(|&n: &u64| n > 0);
     let uneven = || Some((count("fewest")?, count("most")?)).filter(|(fewest, most)| fewest <= most);
     let origin = || {
-        let (source, seed) = (printable(said("source")?), said("seed")?.parse().ok()?);
+        let (source, seed) = (printable(stated("source")?), stated("seed")?.parse().ok()?);
         let (source, options) = source.rsplit_once(OPTIONS).unwrap_or((&source, ""));
         let (source, options) = (source.to_owned(), options.to_owned());
-        Some(SampleOrigin { source, options, seed, repeats: said("repeats") == Some("samples") })
+        Some(SampleOrigin { source, options, seed, repeats: stated("repeats") == Some("samples") })
     };
     SampleFacts { samples: even.or_else(uneven), origin: origin() }
 }

@@ -228,11 +228,6 @@ const CORNER: usize = 11;
 const PAPER: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [20, 20, 20];
 
-/// Display-encoded pixels in [0, 1] as bytes.
-pub fn display_bytes(encoded: &[Rgb]) -> Vec<u8> {
-    encoded.iter().flatten().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8).collect()
-}
-
 /// Draws `marks` over a picture, legend at the right.
 pub fn draw_tiles(picture: &Canvas, marks: &[TileMark], scale: &ColourScale) -> Canvas {
     let (width, height) = (picture.width(), picture.height());

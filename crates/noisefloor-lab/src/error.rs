@@ -2,11 +2,11 @@
 
 use noisefloor::{
     SessionError, SourceError, criterion::CriterionError, film::FilmError, params::ParamsError,
-    svm::SvmTrainError, tile::TileError,
+    tile::TileError,
 };
 use noisefloor_denoise::DenoiseError;
 use noisefloor_image::{PictureError, WriteError};
-use noisefloor_learn::{CorpusError, TableError};
+use noisefloor_learn::{CorpusError, SvmTrainError, TableError};
 use noisefloor_rivals::MetricError;
 use std::io;
 use std::path::PathBuf;
@@ -65,7 +65,7 @@ pub enum LabError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A plot could not be drawn.

@@ -33,7 +33,10 @@ const WIDEST_RATIO: f64 = 3.0;
 ///
 /// # Errors
 /// [`LabError::Corpus`] if a corpus cannot be read.
-pub fn map_zones(corpus: &[PathBuf], predictions: &[Prediction]) -> Result<Vec<(String, Canvas)>, LabError> {
+pub(crate) fn map_zones(
+    corpus: &[PathBuf],
+    predictions: &[Prediction],
+) -> Result<Vec<(String, Canvas)>, LabError> {
     let mut scenes: Vec<&str> = predictions.iter().map(|p| p.scene.as_str()).collect();
     scenes.dedup();
     let mut pictures = BTreeMap::new();
@@ -72,7 +75,7 @@ fn mark(zone: &Prediction, places: &Places) -> Option<TileMark> {
     })
 }
 
-/// Writes `zones-SCENE.png` of [`map_zones`], `thresholds.svg` and `reliability.svg` into the folder, which
+/// Writes `zones-SCENE.png` of each scene, `thresholds.svg` and `reliability.svg` into the folder, which
 /// is made. `bins` is the reliability curve.
 ///
 /// # Errors
@@ -141,7 +144,7 @@ const LETTERS: (&str, u32) = ("sans-serif", 15);
 ///
 /// # Errors
 /// [`LabError::Plot`] if nothing can be drawn.
-pub fn plot_thresholds(predictions: &[Prediction]) -> Result<String, LabError> {
+pub(crate) fn plot_thresholds(predictions: &[Prediction]) -> Result<String, LabError> {
     svg(SIZE, |root| thresholds(root, predictions))
 }
 
@@ -149,7 +152,7 @@ pub fn plot_thresholds(predictions: &[Prediction]) -> Result<String, LabError> {
 ///
 /// # Errors
 /// [`LabError::Plot`] if nothing can be drawn.
-pub fn plot_reliability(bins: &[ReliabilityBin]) -> Result<String, LabError> {
+pub(crate) fn plot_reliability(bins: &[ReliabilityBin]) -> Result<String, LabError> {
     svg(SIZE, |root| reliability(root, bins))
 }
 

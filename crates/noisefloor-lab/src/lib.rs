@@ -1,5 +1,7 @@
 //! Experiments on stopping criteria: what each one costs, what it leaves, and how close it comes to people.
 //!
+//! This crate serves the commands: any release may change its interface.
+//!
 //! - [`compare`]: criteria that watch one render; samples, seconds and distance from the converged picture
 //!   of each.
 //! - [`rivals`]: other people's criteria on pictures whose noise thresholds people gave.

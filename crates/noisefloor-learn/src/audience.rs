@@ -5,7 +5,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 /// Fewest pairs that a line is fitted to.
-pub const MIN_PAIRS: usize = 3;
+pub(crate) const MIN_PAIRS: usize = 3;
 /// Most pairs that a line is fitted to: all slopes between two of them are held at once.
 pub const MAX_PAIRS: usize = 2000;
 /// Pairs are drawn anew, with replacement, so often; the percentiles of 1000 lines are known to about half a

@@ -5,13 +5,14 @@ use crate::machine::Fitted;
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::score::score;
+use crate::svm::{SvmParams, SvmTrainError, fit_platt};
 use crate::table::{Table, Zone};
 use noisefloor::{
     Audience, People,
     internal::nearest,
     model::{Familiarity, ModelParts, TrainingRecord},
     oracle::Spread,
-    svm::{Classifier, Platt, Scaler, SvmParams, SvmTrainError, fit_platt},
+    svm::{Classifier, Platt, Scaler},
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;

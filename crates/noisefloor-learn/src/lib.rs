@@ -27,27 +27,29 @@ mod params;
 mod predict;
 mod score;
 mod stimulus;
+mod svm;
 mod table;
 mod table_csv;
 mod train;
 
 pub use answer::Answer;
-pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS, MIN_PAIRS};
+pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS};
 pub use baselines::{constant_noise_baseline, scene_median_baseline};
 pub use choices::{Choice, VISIBLE_CHOICES, choices};
 pub use corpus::{
-    CENSORED_SPP, Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch,
-    ZoneImages, zone_levels,
+    Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch, ZoneImages,
+    zone_levels,
 };
-pub use describe::{Corpora, describe_corpora, describe_pairs, noise_level};
+pub use describe::{Corpora, describe_corpora, describe_pairs};
 pub use error::TableError;
 pub use evaluation::{Baselines, Evaluation, PredictionScores, SceneScores};
 pub use nested::{Chosen, choose_and_leave_out};
-pub use observers::observers_agreeing;
+
 pub use params::{Learner, TrainError, TrainParams};
 pub use predict::{Prediction, predict};
 pub use score::{ReliabilityBin, calibration_error, error_interval, image_accuracy, reliability, score};
 pub use stimulus::{as_difference, as_noise};
+pub use svm::{SvmParams, SvmTrainError, check_examples, fit_svm};
 pub use table::{Level, Origin, Table, Zone, first_word};
 pub use table_csv::{read_table, read_table_with, write_table};
 pub use train::{leave_answers_out, leave_one_scene_out, train};

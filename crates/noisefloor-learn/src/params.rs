@@ -1,11 +1,8 @@
 //! How a model is trained, and why it cannot be.
 
 use crate::choices::VISIBLE_CHOICES;
-use noisefloor::{
-    descriptor::Descriptor,
-    model::ModelError,
-    svm::{SvmParams, SvmTrainError},
-};
+use crate::svm::{SvmParams, SvmTrainError};
+use noisefloor::{descriptor::Descriptor, model::ModelError};
 use thiserror::Error;
 
 /// γ of the kernel in which a straight line is kept.
@@ -20,8 +17,8 @@ const WEIGHED: [&str; 3] = ["visible_noise", "picture_noise", "picture_light"];
 pub enum Learner {
     /// A support vector machine, on examples that are noisy or converged (Takouachet et al. 2017, §5).
     Svm,
-    /// Logistic regression on the share of observers who see no difference. It decides on a straight line, and
-    /// is kept as two support vectors of a wide kernel. C is how little its weights are penalised, γ nothing.
+    /// Logistic regression on the share of observers who see no difference: it decides on a straight line. C is
+    /// how little its weights are penalised; γ has no effect.
     Line,
 }
 
@@ -51,7 +48,7 @@ impl Default for TrainParams {
 }
 
 impl TrainParams {
-    /// A support vector machine, for the compact descriptor.
+    /// A support vector machine, for descriptors other than the visible one.
     pub fn svm() -> Self {
         let candidates =
             [0.1, 0.3, 1.0].iter().flat_map(|&c| [0.003, 0.01].map(|gamma| SvmParams { c, gamma })).collect();
@@ -65,11 +62,6 @@ impl TrainParams {
         } else {
             Self::svm()
         }
-    }
-
-    /// For the paper's descriptor: its C and γ, [`SvmParams::PAPER`].
-    pub fn paper() -> Self {
-        Self { candidates: vec![SvmParams::PAPER], ..Self::svm() }
     }
 }
 

@@ -4,11 +4,11 @@ use crate::fit::{familiarity, fit_groups, parts};
 use crate::machine::examples;
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
+use crate::svm::SvmParams;
 use crate::table::Table;
 use noisefloor::{
     Model, People,
     model::{Scores, TrainingRecord},
-    svm::SvmParams,
 };
 
 fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), TrainError> {

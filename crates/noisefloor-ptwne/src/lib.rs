@@ -43,7 +43,6 @@ mod filter;
 mod first_hits;
 mod geometry;
 mod guide;
-mod illumination;
 mod integrator;
 mod intersection;
 mod light;
@@ -57,7 +56,6 @@ mod rng;
 mod sampler;
 mod scene;
 pub mod scenes;
-mod tangents;
 mod texture;
 
 pub use bsdf::{Facets, MIN_ROUGHNESS};

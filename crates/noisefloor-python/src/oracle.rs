@@ -48,13 +48,12 @@ impl PyOracle {
         self.0.model().digest()
     }
 
-    /// What tiles are compared with: "halves", "reference" or "alone". Sessions and judge() serve the first.
+    /// What tiles are compared with: "halves" or "reference". Sessions and judge() serve the first.
     #[getter]
     fn evidence(&self) -> &'static str {
         match self.0.model().evidence() {
             Evidence::Halves => "halves",
             Evidence::Reference => "reference",
-            Evidence::Alone => "alone",
         }
     }
 

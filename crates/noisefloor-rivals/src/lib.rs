@@ -1,6 +1,8 @@
 //! Alternatives to noisefloor's oracle: other stopping criteria of progressive rendering, each a
 //! [`StoppingCriterion`] for the same driver, and the metrics that judge final pictures.
 //!
+//! This crate serves the commands: any release may change its interface.
+//!
 //! | criterion | spec | done when |
 //! |---|---|---|
 //! | [`FixedSpp`](noisefloor::FixedSpp) | `spp:256` | a tile has 256 samples per pixel |

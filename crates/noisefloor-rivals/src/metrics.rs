@@ -7,7 +7,7 @@
 //! | [`relative_mse`] | | linear radiance | |
 //! | [`psnr`] | | display values | |
 //! | `flip` | `flip` | display values, 8 bits | near 0; none published |
-//! | `butteraugli` | `butteraugli` | display values | maximum below `BUTTERAUGLI_SAME` |
+//! | `butteraugli` | `butteraugli` | display values | maximum below 1 |
 //!
 //! [`MetricPair`] has all of them at once, with maps. Pictures are row-major, `width`×`height` pixels.
 
@@ -20,8 +20,8 @@ mod flip;
 mod pair;
 
 #[cfg(feature = "butteraugli")]
-pub use self::butteraugli::{BUTTERAUGLI_SAME, butteraugli};
-pub use arithmetic::{RELATIVE_MSE_EPSILON, psnr, relative_mse};
+pub use self::butteraugli::butteraugli;
+pub use arithmetic::{psnr, relative_mse};
 pub use cvvdp::{cvvdp, cvvdp_of_tiles};
 #[cfg(feature = "flip")]
 pub use flip::flip;

@@ -145,9 +145,4 @@ impl DifferenceMap {
         let sum: f64 = self.values.iter().map(|&v| f64::from(v.abs()).powf(p)).sum();
         (sum / self.values.len() as f64).powf(1.0 / p)
     }
-
-    /// Share of the values above `limit`, in [0, 1].
-    pub fn share_above(&self, limit: f32) -> f64 {
-        self.values.iter().filter(|&&v| v > limit).count() as f64 / self.values.len() as f64
-    }
 }

@@ -67,7 +67,7 @@ struct Batches {
 }
 
 impl Batches {
-    fn look(&mut self, halves: [(Rgb, u64); 2]) {
+    fn update(&mut self, halves: [(Rgb, u64); 2]) {
         for (before, (now, samples)) in self.halves.iter_mut().zip(halves) {
             let after = (f64::from(luminance(now)), samples);
             let new = after.1.saturating_sub(before.1);
@@ -140,7 +140,7 @@ impl StoppingCriterion for RelativeError {
         work.par_iter_mut().for_each(|(tile, pixels)| {
             pixels.resize(tile.pixels(), Batches::default());
             for (batches, pixel) in pixels.iter_mut().zip(tile.rows(grid.width()).flatten()) {
-                batches.look(film.pixel_halves(tile.index, pixel));
+                batches.update(film.pixel_halves(tile.index, pixel));
             }
         });
 

@@ -143,7 +143,7 @@ mod tests {
     }
 
     /// The pixel that shows the direction.
-    fn look(map: &EnvironmentMap, dir: DVec3) -> Rgb {
+    fn pixel_towards(map: &EnvironmentMap, dir: DVec3) -> Rgb {
         let dir = dir.normalize();
         let nearest =
             (0..map.pixels.len()).max_by(|a, b| direction(*a).dot(dir).total_cmp(&direction(*b).dot(dir)));
@@ -162,7 +162,7 @@ mod tests {
             (DVec3::new(0.99, 0.0, 0.141), [0.085_04, 0.133_63, 0.206_64]),
             (DVec3::new(0.0, 0.0, -1.0), [0.0; 3]),
         ] {
-            let got = look(&map, dir);
+            let got = pixel_towards(&map, dir);
             let off = got.iter().zip(want).any(|(got, want): (&f32, f32)| (got - want).abs() > 0.03 * want);
             assert!(!off, "{dir}: {got:?}, want {want:?}");
         }
@@ -175,7 +175,7 @@ mod tests {
         let flux: f64 = map.pixels.iter().enumerate().map(|(i, p)| f64::from(p[1]) * solid_angle(i)).sum();
         let disk = std::f64::consts::TAU * (1.0 - (0.5 * SUN_DIAMETER).to_radians().cos());
         assert!((flux / (18_034.7 * disk) - 1.0).abs() < 0.02, "{flux}");
-        assert!(look(&map, DVec3::new(0.0, 0.6, 0.8))[1] > 1000.0);
+        assert!(pixel_towards(&map, DVec3::new(0.0, 0.6, 0.8))[1] > 1000.0);
         // A larger sun gives off as much
         let large = ClearSky { sun_diameter: 4.0 * SUN_DIAMETER, ..sky([0.0, 1.0]) };
         let map = large.map(DMat3::IDENTITY).unwrap();

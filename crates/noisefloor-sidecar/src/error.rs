@@ -65,7 +65,7 @@ pub enum SidecarCause {
     Start {
         /// The Python interpreter.
         python: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The process ended, or closed its stream, before it replied.
@@ -147,7 +147,7 @@ pub enum SetupError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// No interpreter of a version for which the renderer has packages.
@@ -197,7 +197,7 @@ pub enum CommandError {
     Scene {
         /// The scene.
         scene: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The size of the picture is unknown.
@@ -208,7 +208,7 @@ pub enum CommandError {
     Folder {
         /// The folder for temporary files.
         folder: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The program could not be started.
@@ -216,7 +216,7 @@ pub enum CommandError {
     Start {
         /// The program.
         program: String,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The program ended with an error, or took too long and was killed.

@@ -1,7 +1,10 @@
 //! Errors. Every message says what happened, where, and what to do.
 
+use axum::http::StatusCode;
 use noisefloor::tile::TileError;
 use noisefloor_image::{PictureError, StackError, WriteError};
+use noisefloor_pages::PagesError;
+use noisefloor_pages::http::Refusal;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -14,7 +17,7 @@ pub enum StudyError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The study file is invalid.
@@ -75,14 +78,9 @@ pub enum StudyError {
     /// The answers cannot be read or stored.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The server cannot listen on an address.
-    #[error("cannot listen on {address}: {source}; choose another port with --port")]
-    Listen {
-        /// The address.
-        address: String,
-        /// What the system said.
-        source: io::Error,
-    },
+    /// The server cannot listen on an address, or a language file is invalid.
+    #[error(transparent)]
+    Pages(#[from] PagesError),
     /// A stack cannot be rendered.
     #[error("{0}")]
     StackRender(String),
@@ -157,4 +155,35 @@ pub enum StoreError {
         /// What is wrong with it.
         what: String,
     },
+}
+
+impl From<StoreError> for Refusal {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Unknown(_) => Self::unknown_code(),
+            StoreError::NoLink => {
+                let do_ = "copy the whole link, or ask who invited you";
+                Self::new(StatusCode::NOT_FOUND, "nobody was invited by this link", "link", do_)
+            }
+            StoreError::Conflict { seq, .. } => conflict(seq, seq + 1),
+            error => {
+                // Paths of the machine are for who runs the server, not for who answers
+                eprintln!("error: {error}");
+                let what = "the answer could not be kept";
+                let do_ = "tell who runs the study; answers that were acknowledged are safe";
+                Self::new(StatusCode::INTERNAL_SERVER_ERROR, what, "database", do_)
+            }
+        }
+    }
+}
+
+/// The number of an event is taken by another one, or leaves a gap.
+pub(crate) fn conflict(seq: u64, next: u64) -> Refusal {
+    let what = if seq < next {
+        format!("event {seq} is there already, and is another one")
+    } else {
+        format!("event {seq} leaves a gap: the next one is {next}")
+    };
+    let do_ = "load the session again, and continue from its next_seq";
+    Refusal::new(StatusCode::CONFLICT, what, "seq", do_).with_next_seq(next)
 }

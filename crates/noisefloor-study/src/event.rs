@@ -1,6 +1,6 @@
 //! What observers do, as it is sent and stored.
 
-use crate::viewing::Conditions;
+use noisefloor_pages::viewing::Conditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

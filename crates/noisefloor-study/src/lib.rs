@@ -1,5 +1,7 @@
 //! Experiments with people, in the browser: noise thresholds are collected, validated and analysed.
 //!
+//! This crate serves the commands: any release may change its interface.
+//!
 //! - [`Study`] is a checked study file: stacks of pictures, a protocol, what observers read and agree to.
 //! - [`StudyServer`] shows it to observers and keeps every [`StudyEvent`] before it acknowledges it;
 //!   [`store`] is where.
@@ -8,8 +10,6 @@
 //! - [`analysis`] makes thresholds, agreements and tables of the answers, and a corpus for `noisefloor
 //!   train`.
 //! - [`explore`] judges one's own pictures in the browser, keeps disagreements, and learns from them.
-//! - [`calibrate`] measures how many samples one's own eyes need, in two minutes.
-//! - [`watch`] shows a render while it runs.
 //! - [`simulated`] are observers made of numbers, who drive the same server: to test the whole chain, and
 //!   to plan a study.
 //!
@@ -46,34 +46,24 @@
 //! ```
 
 pub mod analysis;
-pub mod calibrate;
 mod code;
 mod config;
 mod error;
 mod event;
 pub mod explore;
-mod http;
-mod languages;
-mod questplus;
-mod random;
 mod server;
 mod session;
 pub mod simulated;
 mod stack;
 mod stack_render;
 pub mod store;
-mod viewing;
-pub mod watch;
 
 pub use code::parse as parse_code;
 pub use config::{
-    AnswerOption, MAX_STACKS, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
+    AnswerOption, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
 };
 pub use error::{StoreError, StudyError};
 pub use event::{Choice, Envelope, StudyEvent, TrialTiming};
-pub use http::{Exposure, interrupted};
-pub use languages::{Direction, Language, read_languages};
-pub use questplus::{GUESS, LAPSE, Posterior, QuestGrid, QuestPlus, right, sees};
 pub use server::{
     Beginning, CompletionView, LanguageView, Overview, OverviewRow, SessionView, StackView, StudyServer,
     StudyView,
@@ -82,7 +72,6 @@ pub use session::{
     CatchKind, Class, EventMisfit, Haste, ParticipantSession, Plan, Stage, Trial, TrialOutcome, TrialRole,
     grids, replay,
 };
-pub use stack::{MAX_LEVELS, NOISY_SHARE, StudyStack};
+pub use stack::StudyStack;
 pub use stack_render::render_stack;
 pub use store::{AnswerStore, NewSession, SessionRecord};
-pub use viewing::{Ambient, Conditions, ViewingLimits, ViewingProblem};

@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Most pictures of a stack.
-pub const MAX_LEVELS: usize = 2000;
+pub(crate) const MAX_LEVELS: usize = 2000;
 /// The share of the threshold that makes the noisy class (Takouachet et al. 2017, §7.2).
-pub const NOISY_SHARE: f64 = 0.3;
+pub(crate) const NOISY_SHARE: f64 = 0.3;
 /// Most tiles of a picture.
 const MAX_TILES: usize = 1024;
 /// Most pixels of a picture; a larger one would not fit on a screen unscaled.
@@ -127,7 +127,7 @@ impl StudyStack {
     }
 
     /// Whether the pictures are tone mapped for display.
-    pub fn is_tone_mapped(&self) -> bool {
+    pub(crate) fn is_tone_mapped(&self) -> bool {
         self.display.is_some()
     }
 

@@ -82,13 +82,13 @@ fn halve_row(row: &[f32], out: &mut [f32]) {
 /// it. `row` is room for as many pixels as the coarser level has columns, and two.
 pub(crate) fn expand_row(coarse: &[f32], size: Size, y: usize, row: &mut [f32], out: &mut [f32]) {
     let half = size.half();
-    let of = |y: usize| &coarse[y.min(half.height - 1) * half.width..][..half.width];
+    let row_of = |y: usize| &coarse[y.min(half.height - 1) * half.width..][..half.width];
     let row = &mut row[..half.width + 2];
     let (middle, inner) = (y / 2, 1..=half.width);
     if y.is_multiple_of(2) {
-        weigh_rows([of(middle.saturating_sub(1)), of(middle), of(middle + 1)], &mut row[inner]);
+        weigh_rows([row_of(middle.saturating_sub(1)), row_of(middle), row_of(middle + 1)], &mut row[inner]);
     } else {
-        average_rows([of(middle), of(middle + 1)], &mut row[inner]);
+        average_rows([row_of(middle), row_of(middle + 1)], &mut row[inner]);
     }
     row[0] = row[1];
     row[half.width + 1] = row[half.width];

@@ -1,6 +1,6 @@
 //! A snapshot of a session, for resuming it.
 
-use crate::container::{self, Fault, Format, MAX_PAYLOAD};
+use crate::container::{self, FileFault, Format, MAX_PAYLOAD};
 use crate::display::Display;
 use crate::film::{Film, FilmHead};
 use crate::params::{Audience, Params, Schedule};
@@ -96,14 +96,14 @@ pub enum CheckpointError {
     Criterion(String),
 }
 
-impl From<Fault> for CheckpointError {
-    fn from(fault: Fault) -> Self {
+impl From<FileFault> for CheckpointError {
+    fn from(fault: FileFault) -> Self {
         match fault {
-            Fault::Io(error) => Self::Io(error),
-            Fault::Foreign => Self::Foreign,
-            Fault::Version(found) => Self::Version(found),
-            Fault::Damaged(what) => Self::Damaged(what),
-            Fault::Oversized(bytes) => Self::Oversized(bytes),
+            FileFault::Io(error) => Self::Io(error),
+            FileFault::Foreign => Self::Foreign,
+            FileFault::Version(found) => Self::Version(found),
+            FileFault::Damaged(what) => Self::Damaged(what),
+            FileFault::Oversized(bytes) => Self::Oversized(bytes),
         }
     }
 }
@@ -117,7 +117,7 @@ impl Checkpoint<'_> {
         let whole = |head: Head<'static>, from: &mut dyn Read| {
             let Head { job, source, criterion, state, params, display, settling, film, tiles, watch } = head;
             let film = Film::read_pixels(film, from).map_err(ended)?;
-            let film = film.ok_or_else(|| Fault::Damaged("there is no such film".into()))?;
+            let film = film.ok_or_else(|| FileFault::Damaged("there is no such film".into()))?;
             let (criterion, state, film) = (criterion.into_owned(), state.into_owned(), Cow::Owned(film));
             Ok(Checkpoint { job, source, criterion, state, params, display, settling, film, tiles, watch })
         };
@@ -237,10 +237,10 @@ fn schedule_in_words(schedule: Schedule) -> String {
 }
 
 /// A file that ends early is damaged, and not unreadable.
-fn ended(error: io::Error) -> Fault {
+fn ended(error: io::Error) -> FileFault {
     match error.kind() {
-        io::ErrorKind::UnexpectedEof => Fault::Damaged("it ends within its film".into()),
-        _ => Fault::Io(error),
+        io::ErrorKind::UnexpectedEof => FileFault::Damaged("it ends within its film".into()),
+        _ => FileFault::Io(error),
     }
 }
 

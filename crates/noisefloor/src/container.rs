@@ -22,7 +22,7 @@ pub struct Format {
 
 /// What is wrong with a file.
 #[derive(Debug)]
-pub enum Fault {
+pub enum FileFault {
     /// It cannot be read or written.
     Io(io::Error),
     /// It does not begin with the magic.
@@ -35,7 +35,7 @@ pub enum Fault {
     Oversized(u64),
 }
 
-impl From<io::Error> for Fault {
+impl From<io::Error> for FileFault {
     fn from(error: io::Error) -> Self {
         Self::Io(error)
     }
@@ -43,7 +43,7 @@ impl From<io::Error> for Fault {
 
 impl Format {
     /// Reads what [`Format::write`] wrote.
-    pub(crate) fn read<T: DeserializeOwned>(&self, mut from: impl Read) -> Result<T, Fault> {
+    pub(crate) fn read<T: DeserializeOwned>(&self, mut from: impl Read) -> Result<T, FileFault> {
         let content = self.read_payload(&mut from)?;
         end(from)?;
         Ok(content)
@@ -54,47 +54,47 @@ impl Format {
     pub(crate) fn read_with_body<H: DeserializeOwned, T>(
         &self,
         mut from: impl Read,
-        body: impl FnOnce(H, &mut dyn Read) -> Result<T, Fault>,
-    ) -> Result<T, Fault> {
+        body: impl FnOnce(H, &mut dyn Read) -> Result<T, FileFault>,
+    ) -> Result<T, FileFault> {
         let head = self.read_payload(&mut from)?;
         let mut hashed = Hashed::new(&mut from);
         let content = body(head, &mut hashed)?;
         let (computed, mut checksum) = (hashed.hasher.finalize(), [0; 32]);
         if !read_up_to(&mut from, &mut checksum)? || *computed.as_bytes() != checksum {
-            return Err(Fault::Damaged("its checksum differs".into()));
+            return Err(FileFault::Damaged("its checksum differs".into()));
         }
         end(from)?;
         Ok(content)
     }
 
-    fn read_payload<T: DeserializeOwned>(&self, from: &mut impl Read) -> Result<T, Fault> {
+    fn read_payload<T: DeserializeOwned>(&self, from: &mut impl Read) -> Result<T, FileFault> {
         unpack(&self.read_bytes(from, MAX_PAYLOAD)?)
     }
 
     /// Reads the payload, of at most `limit` bytes, and leaves what follows it.
     ///
     /// # Errors
-    /// [`Fault`].
-    pub fn read_bytes(&self, from: &mut impl Read, limit: u64) -> Result<Vec<u8>, Fault> {
+    /// [`FileFault`].
+    pub fn read_bytes(&self, from: &mut impl Read, limit: u64) -> Result<Vec<u8>, FileFault> {
         // Read the header. A file too short to have one is foreign.
         let mut magic = [0; 8];
         let whole = read_up_to(from, &mut magic)?;
         if !whole || magic != self.magic {
-            return Err(Fault::Foreign);
+            return Err(FileFault::Foreign);
         }
         let mut header = [0; 4 + 8 + 32];
         if !read_up_to(from, &mut header)? {
-            return Err(Fault::Damaged("it ends within its header".into()));
+            return Err(FileFault::Damaged("it ends within its header".into()));
         }
         let (version, rest) = header.split_at(4);
         let (length, checksum) = rest.split_at(8);
         let version = u32::from_le_bytes(version.try_into().unwrap_or_default());
         if version != self.version {
-            return Err(Fault::Version(version));
+            return Err(FileFault::Version(version));
         }
         let length = u64::from_le_bytes(length.try_into().unwrap_or_default());
         if length > limit {
-            return Err(Fault::Oversized(length));
+            return Err(FileFault::Oversized(length));
         }
 
         // Read the payload as far as there is one: memory grows with what arrives, not with what is
@@ -102,19 +102,19 @@ impl Format {
         let mut payload = Vec::new();
         from.take(length).read_to_end(&mut payload)?;
         if (payload.len() as u64) < length {
-            return Err(Fault::Damaged(format!("it ends before the {length} bytes it announces")));
+            return Err(FileFault::Damaged(format!("it ends before the {length} bytes it announces")));
         }
         if blake3::hash(&payload).as_bytes() != checksum {
-            return Err(Fault::Damaged("its checksum differs".into()));
+            return Err(FileFault::Damaged("its checksum differs".into()));
         }
         Ok(payload)
     }
 
     /// Writes a file.
-    pub(crate) fn write(&self, content: &impl Serialize, mut to: impl Write) -> Result<(), Fault> {
+    pub(crate) fn write(&self, content: &impl Serialize, mut to: impl Write) -> Result<(), FileFault> {
         let payload = payload(content)?;
         if payload.len() as u64 > MAX_PAYLOAD {
-            return Err(Fault::Oversized(payload.len() as u64));
+            return Err(FileFault::Oversized(payload.len() as u64));
         }
         Ok(self.write_bytes(&payload, &mut to)?)
     }
@@ -138,7 +138,7 @@ impl Format {
         head: &impl Serialize,
         mut to: impl Write,
         body: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), FileFault> {
         self.write(head, &mut to)?;
         let mut hashed = Hashed::new(&mut to);
         body(&mut hashed)?;
@@ -181,15 +181,15 @@ impl<R: Read> Read for Hashed<R> {
 }
 
 /// Makes sure that nothing follows.
-fn end(mut from: impl Read) -> Result<(), Fault> {
+fn end(mut from: impl Read) -> Result<(), FileFault> {
     if read_up_to(&mut from, &mut [0])? {
-        return Err(Fault::Damaged("it goes on after its end".into()));
+        return Err(FileFault::Damaged("it goes on after its end".into()));
     }
     Ok(())
 }
 
 /// The content of bytes that [`payload`] returned.
-pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Fault> {
+pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, FileFault> {
     // A length inside the payload is believed up to bincode's limit, which is part of a type and counts
     // numbers by their size in memory: up to sixteen times that in the payload. The least limit above that
     // bounds what a short, crafted payload can reserve.
@@ -201,23 +201,23 @@ pub(crate) fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Fault> {
     }
 }
 
-fn unpack_within<T: DeserializeOwned, const LIMIT: usize>(bytes: &[u8]) -> Result<T, Fault> {
+fn unpack_within<T: DeserializeOwned, const LIMIT: usize>(bytes: &[u8]) -> Result<T, FileFault> {
     let config = bincode::config::standard().with_limit::<LIMIT>();
     let (content, used) = bincode::serde::decode_from_slice(bytes, config).map_err(|error| match error {
         // What a type of ours says of its content
-        DecodeError::OtherString(what) => Fault::Damaged(what),
-        error => Fault::Damaged(error.to_string()),
+        DecodeError::OtherString(what) => FileFault::Damaged(what),
+        error => FileFault::Damaged(error.to_string()),
     })?;
     if used != bytes.len() {
-        return Err(Fault::Damaged("it has bytes left over".into()));
+        return Err(FileFault::Damaged("it has bytes left over".into()));
     }
     Ok(content)
 }
 
 /// The content as bytes, without a header.
-pub(crate) fn payload(content: &impl Serialize) -> Result<Vec<u8>, Fault> {
+pub(crate) fn payload(content: &impl Serialize) -> Result<Vec<u8>, FileFault> {
     bincode::serde::encode_to_vec(content, bincode::config::standard())
-        .map_err(|e| Fault::Damaged(e.to_string()))
+        .map_err(|e| FileFault::Damaged(e.to_string()))
 }
 
 /// Fills the buffer; false if the input ends before.
@@ -240,7 +240,7 @@ mod tests {
             // A length as bincode writes it: 252 for four bytes to follow
             let mut crafted = vec![0u8; length];
             crafted[..5].copy_from_slice(&[252, 0, 0, 0, 0x60]);
-            let Err(Fault::Damaged(what)) = unpack::<String>(&crafted) else { panic!("{length}") };
+            let Err(FileFault::Damaged(what)) = unpack::<String>(&crafted) else { panic!("{length}") };
             assert!(what.contains("LimitExceeded"), "{length}: {what}");
         }
         // One byte each in the payload, eight in memory

@@ -22,14 +22,11 @@ pub enum Evidence {
     Halves,
     /// A noise-free reference: in the paper a quick ray-traced one (Takouachet et al. 2017, §4.3).
     Reference,
-    /// Nothing: everything in the picture that passes the mask counts as noise. For comparison only; useless
-    /// on texture.
-    Alone,
 }
 
 /// Buffers that a thread keeps for its next tile.
 #[derive(Default)]
-struct Room {
+struct Buffers {
     planes: [Vec<f32>; 2],
     columns: Columns,
     scratch: Scratch,
@@ -63,7 +60,7 @@ struct Scratch {
 }
 
 thread_local! {
-    static ROOM: RefCell<Room> = RefCell::default();
+    static BUFFERS: RefCell<Buffers> = RefCell::default();
 }
 
 /// A tile as displayed, and its noise. All planes are display-encoded and have the same shape (rows,
@@ -155,7 +152,7 @@ impl TilePlanes {
     ) -> Self {
         let padded = |edge: usize| edge.next_multiple_of(HALO) + 2 * HALO;
         let shape = (padded(tile.height), padded(tile.width));
-        let Room { planes: [mut image, mut residual], mut columns, mut scratch } = ROOM.take();
+        let Buffers { planes: [mut image, mut residual], mut columns, mut scratch } = BUFFERS.take();
         image.resize(shape.0 * shape.1, 0.0);
         residual.resize(shape.0 * shape.1, 0.0);
         columns.all.clear();
@@ -165,7 +162,7 @@ impl TilePlanes {
         for (place, (image, residual)) in rows.enumerate() {
             row(mirror(tile.y + place, height), &columns, &mut scratch, image, residual);
         }
-        ROOM.set(Room { planes: Default::default(), columns, scratch });
+        BUFFERS.set(Buffers { planes: Default::default(), columns, scratch });
         let [image, residual] =
             [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
         let inner = Tile { x: HALO, y: HALO, ..tile };
@@ -175,7 +172,7 @@ impl TilePlanes {
     /// Returns its memory to this thread's buffers, so that the next verdict does not allocate.
     pub(crate) fn recycle(self) {
         let planes = [self.image, self.residual].map(|plane| plane.into_raw_vec_and_offset().0);
-        ROOM.with_borrow_mut(|room| room.planes = planes);
+        BUFFERS.with_borrow_mut(|buffers| buffers.planes = planes);
     }
 
     /// Evidence from the film's two halves.
@@ -259,17 +256,6 @@ impl TilePlanes {
         };
         let residual = |[shown]: [f32; 1], reference| shown - reference;
         Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
-    }
-
-    /// No evidence but the picture itself: its residual is the picture.
-    pub fn from_picture(film: &Film, display: &Display, tile: Tile) -> Self {
-        let grid = film.grid();
-        let read = |y, columns: &Columns, [picture]: [&mut [Rgb]; 1], _: &mut [f32]| {
-            for (pixel, &x) in picture.iter_mut().zip(&columns.all) {
-                *pixel = film.pixel(tile.owner(grid, x, y), y * grid.width() + x);
-            }
-        };
-        Self::gather_linear((grid.width(), grid.height()), tile, display, read, |[shown]: [f32; 1], _| shown)
     }
 }
 

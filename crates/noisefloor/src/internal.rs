@@ -1,20 +1,53 @@
 //! What other crates of this workspace share with this one; no part of its public interface, and without
 //! promises. Nothing in this crate uses it.
 
-mod text;
+use std::borrow::Cow;
 
-pub use crate::container::{Fault, Format};
+pub use crate::container::{FileFault, Format};
 pub use crate::display::ROUNDING_LUMINANCE;
 pub use crate::evidence::HALO;
 pub use crate::model::familiarity::nearest;
 pub use crate::tile::check_image;
-pub use text::printable;
 
-use crate::descriptor::Descriptor;
+/// Makes text from a file or another program safe to print on a terminal.
+///
+/// Control characters, which can move the cursor, hide text or retitle a window, and invisible marks that
+/// reorder text become escapes like `\u{1b}`. Line breaks and tabs stay.
+///
+/// ```
+/// assert_eq!(noisefloor::internal::printable("wall\x1b[2J\tgrey"), "wall\\u{1b}[2J\tgrey");
+/// ```
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(unsafe_to_print) {
+        return Cow::Borrowed(text);
+    }
+    let mut safe = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if unsafe_to_print(c) { safe.extend(c.escape_default()) } else { safe.push(c) }
+    }
+    Cow::Owned(safe)
+}
 
-/// The paper's first attempt, without a mask, which failed: the luminance of the tile and of what it is
-/// compared with, pixel by pixel (Takouachet et al. 2017, §4.3, §4.4). 2·edge² numbers, for tiles of exactly
-/// edge×edge pixels.
-pub fn luminance_pair(edge: usize) -> Descriptor {
-    Descriptor::luminance_pair(edge)
+/// Controls but line break and tab, and the marks of bidirectional text (Unicode 15, Bidi_Control).
+fn unsafe_to_print(c: char) -> bool {
+    let control = c.is_control() && !matches!(c, '\n' | '\t');
+    control
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn escapes_are_shown_and_text_stays() {
+        for same in ["", "a wall, grün\n\tand 灰色 🙂"] {
+            assert!(matches!(printable(same), Cow::Borrowed(text) if text == same));
+        }
+        // Colour, title of the window, the eight-bit form of ESC [, carriage return, delete, right-to-left
+        // override
+        assert_eq!(printable("\x1b[31m"), "\\u{1b}[31m");
+        assert_eq!(printable("\x1b]0;owned\x07"), "\\u{1b}]0;owned\\u{7}");
+        assert_eq!(printable("\u{9b}2J\r\x7f\u{202e}x"), "\\u{9b}2J\\r\\u{7f}\\u{202e}x");
+    }
 }

@@ -1,12 +1,12 @@
 //! The model: everything a verdict depends on, and its file. The layout is that of `container.rs`.
 
-use crate::container::{self, Fault, Format, MAX_PAYLOAD};
+use crate::container::{self, FileFault, Format, MAX_PAYLOAD};
 use crate::descriptor::{Descriptor, DescriptorError, DescriptorKind, DescriptorSpec};
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
 use crate::oracle::Spread;
 use crate::params::Audience;
-use crate::svm::{Classifier, Machine, platt::from_log_odds};
+use crate::svm::{Classifier, Machine, from_log_odds};
 use noisefloor_vision::{Eotf, Primaries, Viewing, ViewingError, ViewingParams};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -55,7 +55,7 @@ pub enum ModelError {
     #[error("the model announces {0} bytes, more than the limit of {MAX_PAYLOAD}")]
     Oversized(u64),
     /// The content contradicts itself.
-    #[error("the model does not hold together: {0}")]
+    #[error("the model contradicts itself: {0}")]
     Invalid(String),
     /// The model was trained with another version of the descriptor than this release computes.
     #[error(
@@ -74,15 +74,15 @@ pub enum ModelError {
     UnknownDescriptor(#[from] DescriptorError),
 }
 
-impl From<Fault> for ModelError {
-    fn from(fault: Fault) -> Self {
+impl From<FileFault> for ModelError {
+    fn from(fault: FileFault) -> Self {
         match fault {
-            Fault::Io(error) => Self::Io(error),
-            Fault::Foreign => Self::Foreign,
-            Fault::Version(found) if found > VERSION => Self::Newer { found },
-            Fault::Version(found) => Self::Older { found },
-            Fault::Damaged(what) => Self::Damaged(what),
-            Fault::Oversized(bytes) => Self::Oversized(bytes),
+            FileFault::Io(error) => Self::Io(error),
+            FileFault::Foreign => Self::Foreign,
+            FileFault::Version(found) if found > VERSION => Self::Newer { found },
+            FileFault::Version(found) => Self::Older { found },
+            FileFault::Damaged(what) => Self::Damaged(what),
+            FileFault::Oversized(bytes) => Self::Oversized(bytes),
         }
     }
 }

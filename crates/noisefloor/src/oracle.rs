@@ -39,12 +39,12 @@ pub struct Oracle {
     /// How much the thresholds of these people scatter, where they were measured.
     scatter: Option<f64>,
     /// What tiles of the picture were like when last described, for the picture's numbers; of tiles by index.
-    described: Vec<Option<Seen>>,
+    described: Vec<Option<LastDescribed>>,
 }
 
 /// A tile as it was when last described.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Seen {
+struct LastDescribed {
     tile: Described,
     /// Share of its pixels that carry its noise.
     spread: f32,
@@ -226,7 +226,6 @@ impl Oracle {
                 let reference = view.reference.ok_or_else(|| CriterionError::NoReference(self.name()))?;
                 TilePlanes::from_reference(view.film, view.display, reference, tile)
             }
-            Evidence::Alone => TilePlanes::from_picture(view.film, view.display, tile),
         };
         Ok(Some(TilePlanes { viewing: view.viewing, ..planes }))
     }
@@ -277,7 +276,6 @@ impl StoppingCriterion for Oracle {
         match self.model.evidence() {
             Evidence::Halves => Needs::HALVES,
             Evidence::Reference => Needs::REFERENCE,
-            Evidence::Alone => Needs::default(),
         }
     }
 
@@ -328,7 +326,7 @@ impl StoppingCriterion for Oracle {
             let described = this.describe(&planes, spp);
             let spread = planes.noise_spread();
             planes.recycle();
-            described.map(|tile| Some(Seen { tile, spread }))
+            described.map(|tile| Some(LastDescribed { tile, spread }))
         };
         let all: Vec<Tile> = grid.tiles().collect();
         self.described = all.into_par_iter().map(describe).collect::<Result<_, _>>()?;
@@ -369,9 +367,9 @@ impl StoppingCriterion for Oracle {
     }
 
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
-        let Ok(described) = container::unpack::<Vec<Option<Seen>>>(state) else { return false };
-        let sound = |(tile, seen): (Tile, &Option<Seen>)| {
-            let Some(Seen { tile: d, spread }) = seen else { return true };
+        let Ok(described) = container::unpack::<Vec<Option<LastDescribed>>>(state) else { return false };
+        let sound = |(tile, seen): (Tile, &Option<LastDescribed>)| {
+            let Some(LastDescribed { tile: d, spread }) = seen else { return true };
             spread.is_finite()
                 && d.place == tile
                 && d.spp.is_finite()

@@ -188,7 +188,7 @@ pub enum ParamsError {
     #[error("a step of {0} samples cannot be split into two halves: use at least 2")]
     Step(u64),
     /// The limit is too small for two halves.
-    #[error("{0} samples per pixel at most cannot be split into two halves: use at least 2")]
+    #[error("a limit of {0} samples per pixel cannot be split into two halves: use at least 2")]
     MaxSpp(u64),
     /// The limits leave nothing.
     #[error("at most {max} samples per pixel are allowed, but at least {min} are asked for")]

@@ -74,7 +74,7 @@ pub enum StillError {
     /// Two copies of one picture.
     #[error("the pictures are identical, so that nothing shows their noise; render one with another seed")]
     Same,
-    /// One picture only, and a model that needs two.
+    /// One picture only.
     #[error(
         "nothing to compare the picture with: noise shows where two renderings of one view differ; give another rendering, \
          with another seed or more samples, or a converged reference"
@@ -189,7 +189,7 @@ impl Still {
 #[derive(Debug)]
 pub struct SnapshotPair<'a> {
     image: &'a Still,
-    other: Option<Cow<'a, Still>>,
+    other: Cow<'a, Still>,
     evidence: Evidence,
     samples: Samples,
     display: Display,
@@ -215,30 +215,27 @@ impl<'a> SnapshotPair<'a> {
         samples: Option<Samples>,
     ) -> Result<Self, StillError> {
         others.iter().try_for_each(|other| image.fits(other))?;
-        let alone = || tone.settle_noisy(image.size.0, &image.pixels).display;
         let (samples, others) = match samples {
             _ if evidence != Evidence::Halves => (Samples::Independent, others.to_vec()),
             Some(samples) => (samples, others.to_vec()),
             None if image.display_referred => recognise(image, others, &Display::SRGB)?,
-            None => recognise(image, others, &alone())?,
+            None => recognise(image, others, &tone.settle_noisy(image.size.0, &image.pixels).display)?,
         };
         if evidence == Evidence::Halves && samples == Samples::Independent {
             check_apart(&others)?;
         }
         let others = others.as_slice();
         let other = match evidence {
-            Evidence::Alone => None,
-            Evidence::Halves => Some(pool(others, image.spp, samples).ok_or(StillError::Nothing)?),
+            Evidence::Halves => pool(others, image.spp, samples),
             Evidence::Reference => {
-                let cleanest = others.iter().max_by(|a, b| a.spp.total_cmp(&b.spp));
-                Some(Cow::Borrowed(*cleanest.ok_or(StillError::Nothing)?))
+                others.iter().max_by(|a, b| a.spp.total_cmp(&b.spp)).map(|cleanest| Cow::Borrowed(*cleanest))
             }
         };
-        let display = match (&other, evidence) {
+        let other = other.ok_or(StillError::Nothing)?;
+        let display = match evidence {
             _ if image.display_referred => Display::SRGB,
-            (None, _) => alone(),
-            (Some(reference), Evidence::Reference) => tone.settle(&reference.pixels),
-            (Some(other), _) => settle(&tone, image, other, samples),
+            Evidence::Reference => tone.settle(&other.pixels),
+            Evidence::Halves => settle(&tone, image, &other, samples),
         };
         Ok(Self { image, other, evidence, samples, display, viewing: Viewing::default() })
     }
@@ -280,35 +277,28 @@ impl<'a> SnapshotPair<'a> {
         let (image, size) = (self.image, self.image.size);
         let at = |x: usize, y: usize| y * size.0 + x;
         let shown = |still: &Still, x, y| self.display.encode(still.pixels[at(x, y)]);
-        match (&self.other, self.evidence) {
-            (Some(other), Evidence::Halves) => {
+        let other = &*self.other;
+        match self.evidence {
+            Evidence::Halves => {
                 let pair = (image.rendering(), other.rendering());
                 let planes = TilePlanes::from_pair(size, tile, &self.display, pair, self.samples);
                 planes.ok_or(StillError::Nested(image.spp))
             }
-            (Some(other), _) => {
+            Evidence::Reference => {
                 let planes = TilePlanes::gather(size, tile, |x, y| {
                     let (a, b) = (shown(image, x, y), shown(other, x, y));
                     (a, std::array::from_fn(|c| a[c] - b[c]))
                 });
                 Ok(TilePlanes { rounding: image.rounding + other.rounding, ..planes })
             }
-            (None, _) => {
-                let planes = TilePlanes::gather(size, tile, |x, y| {
-                    let a = shown(image, x, y);
-                    (a, a)
-                });
-                Ok(TilePlanes { rounding: image.rounding, ..planes })
-            }
         }
     }
 
     /// For each tile, whether its brightness differs between the two pictures by more than their noise
     /// explains: by a tenth of the display's range on average, and three times the standard deviation from
-    /// pixel to pixel. Renderings of one view have no such tiles, and a verdict on one means nothing. All are
-    /// false if there is nothing to compare with.
+    /// pixel to pixel. Renderings of one view have no such tiles, and a verdict on one means nothing.
     pub fn unlike_tiles(&self, grid: TileGrid) -> Vec<bool> {
-        let Some(other) = &self.other else { return vec![false; grid.len()] };
+        let other = &*self.other;
         let light = |still: &Still, pixel: usize| luminance(self.display.encode(still.pixels[pixel]));
         let unlike = |tile: &Tile| {
             let rows = tile.rows(self.image.size.0);
@@ -319,14 +309,14 @@ impl<'a> SnapshotPair<'a> {
         grid.tiles().collect::<Vec<_>>().par_iter().map(unlike).collect()
     }
 
-    /// What the whole pictures say against a verdict on them: none if there is nothing to compare with.
+    /// What the whole pictures say against a verdict on them.
     ///
     /// Neighbours: the correlation of the displayed difference with itself one pixel beside or below, within
     /// blocks and without their means, which a picture of few samples has below the mean. Brightness: the
     /// mean radiance and the median of blocks both differ, in one direction; a few bright pixels make the
     /// one, and noise of many dark ones the other.
     pub fn warnings(&self) -> Vec<StillWarning> {
-        let Some(other) = &self.other else { return Vec::new() };
+        let other = &*self.other;
         let neighbours = self.correlation_of_neighbours(other).map(StillWarning::Neighbours);
         let brightness = ratio_of_brightness(self.image, other).map(StillWarning::Brightness);
         neighbours.into_iter().chain(brightness).collect()
@@ -408,8 +398,8 @@ fn ratio_of_brightness(one: &Still, other: &Still) -> Option<f64> {
     let light = |still: &Still, pixel: usize| f64::from(luminance(still.pixels[pixel]));
     let (mut sums, mut squares, mut ratios) = ([0.0; 2], 0.0, Vec::new());
     for block in blocks(one.size) {
-        let of = |still: &Still| block.iter().map(|&pixel| light(still, pixel)).sum::<f64>();
-        let (a, b) = (of(one), of(other));
+        let sum = |still: &Still| block.iter().map(|&pixel| light(still, pixel)).sum::<f64>();
+        let (a, b) = (sum(one), sum(other));
         squares += block.iter().map(|&p| (light(one, p) - light(other, p)).powi(2)).sum::<f64>();
         (sums[0], sums[1]) = (sums[0] + a, sums[1] + b);
         // Black in both says nothing

@@ -1,9 +1,9 @@
-use noisefloor::{Model, People, svm::SvmParams};
+use noisefloor::{Model, People};
+use noisefloor_learn::{SvmParams, TrainParams, leave_one_scene_out, train};
 use noisefloor_learn::{
     Table, VISIBLE_CHOICES, choices, choose_and_leave_out, constant_noise_baseline, read_table_with,
     scene_median_baseline, score,
 };
-use noisefloor_learn::{TrainParams, leave_one_scene_out, train};
 use noisefloor_testkit::Noise;
 
 fn fixture(name: &str) -> Table {

@@ -3,9 +3,10 @@ use noisefloor::{
     descriptor::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor},
     evidence::{Evidence, TilePlanes},
     model::ModelError,
-    svm::SvmParams,
 };
-use noisefloor_learn::{Level, Origin, Table, TrainParams, Zone, read_table_with, train, write_table};
+use noisefloor_learn::{
+    Level, Origin, SvmParams, Table, TrainParams, Zone, read_table_with, train, write_table,
+};
 use std::collections::BTreeMap;
 
 /// The logarithm of the standard deviation of the residual: one number, and all of it noise.

@@ -1,7 +1,7 @@
 use std::process::Command;
 
-/// Packages that `noisefloor` pulls in, by the cargo that runs this test, offline.
-fn dependencies(features: &[&str]) -> String {
+/// Packages that a crate pulls in, by the cargo that runs this test, offline.
+fn dependencies(package: &str, features: &[&str]) -> String {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| env!("CARGO").into());
     let output = Command::new(cargo)
         .args([
@@ -9,7 +9,7 @@ fn dependencies(features: &[&str]) -> String {
             "--offline",
             "--locked",
             "--package",
-            "noisefloor",
+            package,
             "--edges",
             "normal",
             "--prefix",
@@ -21,16 +21,16 @@ fn dependencies(features: &[&str]) -> String {
         .unwrap();
     let tree = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "cargo tree: {}", String::from_utf8_lossy(&output.stderr));
-    assert!(tree.starts_with("noisefloor v") && tree.contains("ndarray"), "{tree}");
+    assert!(tree.starts_with(&format!("{package} v")) && tree.contains("ndarray"), "{tree}");
     tree
 }
 
 #[test]
 fn judging_alone_needs_no_machinery_of_training() {
     for features in [&["--no-default-features"][..], &[]] {
-        let tree = dependencies(features);
+        let tree = dependencies("noisefloor", features);
         assert!(!tree.contains("linfa"), "{features:?}:\n{tree}");
     }
     // Training does; so the test can fail
-    assert!(dependencies(&["--features", "train"]).contains("linfa-svm"));
+    assert!(dependencies("noisefloor-learn", &[]).contains("linfa-svm"));
 }

@@ -42,8 +42,6 @@ pub enum EvidenceChoice {
     /// A noise-free reference: SCENE/reference.exr of a corpus, or its most converged picture if there is
     /// none.
     Reference,
-    /// Nothing but the picture itself. For comparison.
-    Alone,
 }
 
 impl From<EvidenceChoice> for Evidence {
@@ -51,7 +49,6 @@ impl From<EvidenceChoice> for Evidence {
         match choice {
             EvidenceChoice::Halves => Self::Halves,
             EvidenceChoice::Reference => Self::Reference,
-            EvidenceChoice::Alone => Self::Alone,
         }
     }
 }

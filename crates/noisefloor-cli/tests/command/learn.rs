@@ -239,7 +239,7 @@ fn disagreements_are_learned_beside_the_table() {
             model: "another".into(),
             descriptor: table.descriptor.spec(),
             descriptor_version: table.descriptor.version(),
-            evidence: if x == 0 { table.evidence } else { Evidence::Alone },
+            evidence: if x == 0 { table.evidence } else { Evidence::Reference },
             numbers: clean.descriptor.clone(),
         };
         kept.keep(&said).unwrap();

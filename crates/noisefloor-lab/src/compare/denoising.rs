@@ -8,7 +8,7 @@ use std::time::Instant;
 
 /// JODs that the worst tile of a denoised picture may have lost to count as converged: what pages and tables ask
 /// for. At 0.3, 58 % of people would prefer the converged picture, by the definition of the unit.
-pub const DENOISED_LIMIT: f64 = 0.3;
+pub(crate) const DENOISED_LIMIT: f64 = 0.3;
 
 /// A picture after denoising, against the converged one.
 #[derive(Clone, Copy, Debug, PartialEq)]

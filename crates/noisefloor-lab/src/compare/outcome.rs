@@ -203,7 +203,7 @@ impl Comparison {
 impl Comparison {
     /// Samples per pixel at which uniform sampling is within [`DENOISED_LIMIT`] once it is denoised; `None`
     /// outside its curve, and where nothing is denoised.
-    pub fn uniform_denoised(&self) -> Option<f64> {
+    pub(crate) fn uniform_denoised(&self) -> Option<f64> {
         let points = self.curve.iter().map(|p| Some((p.spp as f64, 10.0 - p.denoised_jod_worst?)));
         let points: Vec<(f64, f64)> = points.collect::<Option<_>>()?;
         let (first, lost) = *points.first()?;

@@ -142,6 +142,6 @@ impl Yardstick {
 
 /// Values of pixels, pooled over each cell of a grid.
 fn pooled(grid: TileGrid, values: &[f32], pool: fn(&mut dyn Iterator<Item = f32>) -> f64) -> Vec<f64> {
-    let of = |cell: Tile| pool(&mut cell.rows(grid.width()).flatten().map(|pixel| values[pixel]));
-    grid.tiles().map(of).collect()
+    let pool_cell = |cell: Tile| pool(&mut cell.rows(grid.width()).flatten().map(|pixel| values[pixel]));
+    grid.tiles().map(pool_cell).collect()
 }

@@ -1,5 +1,6 @@
 //! What is reproduced, and what all protocols on one representation share.
 
+use super::descriptors::mask_pair;
 use super::pairs::{Loaded, Pairs};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
@@ -41,7 +42,7 @@ impl Geometry {
 impl Reproduction {
     /// Pairs of noise masks, as the paper ends with.
     pub(super) fn masks(&self) -> Descriptor {
-        Descriptor::mask_pair(NoiseMask::default(), self.edge)
+        mask_pair(NoiseMask::default(), self.edge)
     }
 
     pub(super) fn load(&self, descriptor: &Descriptor, watch: Watch<'_>) -> Result<Loaded, LabError> {

@@ -3,13 +3,15 @@
 use super::job::Geometry;
 use super::pairs::{PairScaling, Pairs};
 use super::protocol::{PairProtocol, Split};
+use super::solver::{Weights, fit_weights};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use ndarray::Axis;
 use noisefloor::{
     descriptor::{Descriptor, DescriptorSpec},
-    svm::{Svm, SvmParams, SvmTrainError, Weights, fit_weights},
+    svm::Svm,
 };
+use noisefloor_learn::{SvmParams, SvmTrainError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, Median};

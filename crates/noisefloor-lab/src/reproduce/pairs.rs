@@ -1,8 +1,9 @@
 //! The pairs as rows, and what is known of each.
 
+use super::gram::squared_distances;
 use crate::error::LabError;
 use ndarray::Array2;
-use noisefloor::svm::{Scaler, squared_distances};
+use noisefloor::svm::Scaler;
 use noisefloor_learn::{Level, Origin, Table};
 use serde::{Deserialize, Serialize};
 

@@ -79,10 +79,10 @@ impl PairProtocol {
 
 /// Where to cut the groups, so that both parts have about as many pairs; neither is empty.
 fn half(pairs: &Pairs, groups: &[&str]) -> usize {
-    let of = |groups: &[&str]| {
+    let count = |groups: &[&str]| {
         pairs.known[..pairs.synthesised].iter().filter(|p| groups.contains(&p.group.as_str())).count()
     };
-    let uneven = |&cut: &usize| of(&groups[..cut]).abs_diff(of(&groups[cut..]));
+    let uneven = |&cut: &usize| count(&groups[..cut]).abs_diff(count(&groups[cut..]));
     (1..groups.len()).min_by_key(uneven).unwrap_or(1)
 }
 

@@ -2,12 +2,13 @@
 
 use super::job::Reproduction;
 use super::pairs::Pairs;
+use super::solver::fit_rows;
 use crate::advance::Watch;
 use crate::error::LabError;
 use crate::files::{make_folder, write_json};
 use ndarray::{Array2, ArrayView2, s};
-use noisefloor::svm::{SvmParams, fit_svm};
 use noisefloor_image::write_atomic;
+use noisefloor_learn::SvmParams;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
@@ -61,7 +62,7 @@ fn learn(pairs: &Pairs, count: usize) -> Result<PairSubset, LabError> {
     let params = SvmParams::PAPER;
     let learned = rows.slice(s![..count, ..]).mapv(f64::from);
     let begun = Instant::now();
-    let svm = fit_svm(learned.view(), &identical[..count], params)
+    let svm = fit_rows(learned.view(), &identical[..count], params)
         .map_err(|source| LabError::Train { machine: "the machine of the subset".into(), source })?;
     let seconds_training = begun.elapsed().as_secs_f64();
     let begun = Instant::now();

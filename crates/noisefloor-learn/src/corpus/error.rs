@@ -13,7 +13,7 @@ pub enum CorpusError {
     Io {
         /// The table.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A line of `thresholds.csv` is malformed.

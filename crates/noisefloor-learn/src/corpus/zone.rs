@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// A threshold at or above this many samples per pixel is censored: observers were offered no more.
-pub const CENSORED_SPP: f64 = 10_000.0;
+pub(crate) const CENSORED_SPP: f64 = 10_000.0;
 
 /// Where the images of a zone are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub struct JudgedZone {
     pub height: usize,
     /// Mean samples per pixel at which observers could no longer tell the zone from the reference; positive.
     pub human_spp: f64,
-    /// Whether `human_spp` is only a lower bound: it is at least [`CENSORED_SPP`], or at least `last_spp`.
+    /// Whether `human_spp` is only a lower bound: it is at least 10,000, or at least `last_spp`.
     /// Keep it out of means.
     pub censored: bool,
     /// Samples per pixel of the least converged image observers could choose.

@@ -197,7 +197,6 @@ impl Material {
                 let pictures = if self.reference.is_some() { 1.0 } else { 2.0 };
                 self.to_reference(self.tile, &r.shown, pictures * self.rounding)
             }
-            Evidence::Alone => self.planes(self.tile, &r.shown, &r.shown, self.rounding),
         };
         let real = self.real.iter().map(|r| (r.spp, Origin::Real, planes(r)));
         let synthesised = synthesised.iter().flat_map(|&spp| {
@@ -255,7 +254,6 @@ impl Material {
                 let own = if self.reference.is_some() { self.rounding } else { 0.0 };
                 self.to_reference(self.tile, &shown, rounding + own)
             }
-            Evidence::Alone => self.planes(self.tile, &shown, &shown, rounding + self.rounding),
         }
     }
 }

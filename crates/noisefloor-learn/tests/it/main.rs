@@ -3,7 +3,5 @@
 
 /// Thresholds and the images they belong to.
 mod corpus;
-/// The paper's pairs.
-mod pairs;
 /// The human data in `../shared`, where they are.
 mod shared;

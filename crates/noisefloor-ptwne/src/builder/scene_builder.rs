@@ -1,7 +1,7 @@
 //! The builder.
 
-use super::input::{Emission, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
-use crate::accel::Shape;
+use super::input::{Emission, MAX_INSTANCES, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
+use crate::accel::{self, Instance, Shape};
 use crate::bsdf::Coat;
 use crate::camera::{Camera, Optics};
 use crate::checks::{MAX_COORDINATE, check_radiance, check_range, position, room};
@@ -9,10 +9,12 @@ use crate::environment::{Environment, EnvironmentMap};
 use crate::error::SceneError;
 use crate::geometry::{Group, NO, RINGS, RINGS_REVERSED};
 use crate::light::{Light, LightShape, Punctual};
-use crate::parts::{Parts, Surroundings};
+use crate::material::{CompiledMaterial, Material, MaterialOptions};
+use crate::math::Vec3;
+use crate::parts::{Object, Parts, Surroundings};
 use crate::scene::Scene;
 use crate::texture::Texture;
-use glam::Vec3;
+use glam::{DAffine3, DMat3, DVec3};
 use noisefloor::Rgb;
 use std::sync::Arc;
 
@@ -241,7 +243,8 @@ impl SceneBuilder {
             group.corners = index(vertices.corners.len())?;
             if !mesh.normals.is_empty() {
                 group.normals = index(vertices.normals.len())?;
-                let unit = |n: &[f32; 3]| Vec3::from(*n).as_dvec3().normalize_or_zero().as_vec3().to_array();
+                let unit =
+                    |n: &[f32; 3]| glam::Vec3::from(*n).as_dvec3().normalize_or_zero().as_vec3().to_array();
                 room(&mut vertices.normals, mesh.normals.len())?;
                 vertices.normals.extend(mesh.normals.iter().map(unit));
             }
@@ -282,7 +285,7 @@ impl SceneBuilder {
         }
         let mut left_out = 0;
         for triangle in mesh.indices {
-            let [a, b, c] = triangle.map(|i| Vec3::from(mesh.positions[i as usize]));
+            let [a, b, c] = triangle.map(|i| glam::Vec3::from(mesh.positions[i as usize]));
             let shape = Shape::Planar { corner: a, e1: b - a, e2: c - a, whole: false };
             if self.push(shape, group_emission)? {
                 if with_vertices {
@@ -430,4 +433,156 @@ struct GroupEmission {
 fn index(count: usize) -> Result<u32, SceneError> {
     let found = u32::try_from(count).ok().filter(|i| *i < 1 << 31);
     found.ok_or(SceneError::TooLarge { what: "corners", found: count, limit: 1 << 31 })
+}
+
+// Materials of a builder.
+
+impl SceneBuilder {
+    /// Adds a material that is opaque and two-sided.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::material_with`].
+    pub fn material(&mut self, material: Material) -> Result<MaterialId, SceneError> {
+        self.material_with(material, MaterialOptions::default())
+    }
+
+    /// Adds a material that may be transparent in parts, or one-sided.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a reflectance, index of refraction or roughness is out of range, or an image has the
+    /// wrong number of pixels.
+    pub fn material_with(
+        &mut self,
+        material: Material,
+        options: MaterialOptions,
+    ) -> Result<MaterialId, SceneError> {
+        self.parts.materials.push(CompiledMaterial::new(material, options, &mut self.coats)?);
+        Ok(MaterialId(self.parts.materials.len() as u32 - 1))
+    }
+
+    /// Adds a material that is `share` of the second one (the mean of the channels) and the rest of the
+    /// first. Their opacities do not count, only that of `options`.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a material is of another builder, or a share is not in 0…1.
+    pub fn mixed_material(
+        &mut self,
+        first: MaterialId,
+        second: MaterialId,
+        share: Texture,
+        options: MaterialOptions,
+    ) -> Result<MaterialId, SceneError> {
+        self.mix([first, second], share, false, options)
+    }
+
+    /// Adds a material under a coat, as glTF's clearcoat: a `share` of 1 is a coat that reflects as `coat` does,
+    /// times Schlick's Fresnel term of an index of refraction of 1.5 at the angle of view; the rest is `base`.
+    /// Opacities as in [`SceneBuilder::mixed_material`].
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::mixed_material`].
+    pub fn coated_material(
+        &mut self,
+        base: MaterialId,
+        coat: MaterialId,
+        share: Texture,
+        options: MaterialOptions,
+    ) -> Result<MaterialId, SceneError> {
+        self.mix([base, coat], share, true, options)
+    }
+
+    fn mix(
+        &mut self,
+        parts: [MaterialId; 2],
+        share: Texture,
+        coat: bool,
+        options: MaterialOptions,
+    ) -> Result<MaterialId, SceneError> {
+        if let Some(MaterialId(id)) = parts.iter().find(|id| id.0 as usize >= self.parts.materials.len()) {
+            return Err(SceneError::Material(*id));
+        }
+        self.parts.materials.push(CompiledMaterial::mix(parts.map(|id| id.0), share, coat, options)?);
+        Ok(MaterialId(self.parts.materials.len() as u32 - 1))
+    }
+}
+
+// Objects of a builder, and their instances.
+
+/// An object of a [`SceneBuilder`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ObjectId(u32);
+
+impl SceneBuilder {
+    /// Begins an object: the surfaces that are added up to [`SceneBuilder::end_object`] are seen only through its
+    /// instances, which share them. They must not shine: a light has a place of its own, so emitters are added
+    /// in the scene, for each instance.
+    ///
+    /// # Errors
+    /// [`SceneError::Object`] if an object has begun already.
+    pub fn begin_object(&mut self) -> Result<(), SceneError> {
+        if self.open_object.is_some() {
+            return Err(SceneError::Object("an object in an object"));
+        }
+        self.open_object = Some(self.parts.shapes.len() as u32);
+        Ok(())
+    }
+
+    /// Ends the object.
+    ///
+    /// # Errors
+    /// [`SceneError::Object`] if none has begun.
+    pub fn end_object(&mut self) -> Result<ObjectId, SceneError> {
+        let first = self.open_object.take().ok_or(SceneError::Object("the end of no object"))?;
+        let surfaces = first..self.parts.shapes.len() as u32;
+        let shapes = &mut self.parts.shapes[first as usize..];
+        let mut object = Object { surfaces, bounds: [Vec3::ZERO; 2], origin: glam::Vec3::ZERO };
+        if let Some([low, high]) = accel::bounds(&*shapes) {
+            // Around the origin, so that `f32` keeps its detail
+            let centre = 0.5 * (low + high);
+            if centre.abs().max_element() > 0.5 * (high - low).length() {
+                object.origin = centre.into();
+                shapes.iter_mut().for_each(|shape| *shape = shape.translated(-object.origin));
+            }
+            object.bounds = [low, high].map(|corner| corner - Vec3::from(object.origin));
+        }
+        self.parts.objects.push(object);
+        Ok(ObjectId(self.parts.objects.len() as u32 - 1))
+    }
+
+    /// Shows an object once more, moved by a matrix whose rows are given, translation last. It costs a hundred
+    /// bytes, whatever is in the object. Fronts stay fronts where the matrix mirrors.
+    ///
+    /// # Errors
+    /// [`SceneError::Singular`] if the matrix flattens the object, or is too near to one that does for `f32`;
+    /// [`SceneError`] if a number is not finite or too large, the object is of another builder, an object has
+    /// begun and not ended, or there are more than [`MAX_INSTANCES`].
+    pub fn instance(&mut self, object: ObjectId, to_world: [[f64; 4]; 3]) -> Result<(), SceneError> {
+        if self.open_object.is_some() {
+            return Err(SceneError::Object("an instance in an object"));
+        }
+        let Some(shared) = self.parts.objects.get(object.0 as usize) else {
+            return Err(SceneError::Object("an instance of an object that does not exist in this builder"));
+        };
+        let found = self.parts.instances.len() + 1;
+        if found > MAX_INSTANCES {
+            return Err(SceneError::TooLarge { what: "instances", found, limit: MAX_INSTANCES });
+        }
+        if !to_world.iter().flatten().all(|x| x.is_finite()) {
+            return Err(SceneError::NotFinite { what: "the matrix of an instance" });
+        }
+        if shared.surfaces.is_empty() {
+            return Ok(());
+        }
+        let column = |i: usize| DVec3::new(to_world[0][i], to_world[1][i], to_world[2][i]);
+        let [x, y, z, at] = [0, 1, 2, 3].map(column);
+        let matrix = DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), at)
+            * DAffine3::from_translation(shared.origin.as_dvec3());
+        let instance = Instance::new(object.0, matrix).ok_or(SceneError::Singular)?;
+        let [middle, half] = instance.around(shared.bounds);
+        position((middle - half).to_array())?;
+        position((middle + half).to_array())?;
+        room(&mut self.parts.instances, 1)?;
+        self.parts.instances.push(instance);
+        Ok(())
+    }
 }

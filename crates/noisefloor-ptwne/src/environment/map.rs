@@ -75,8 +75,8 @@ impl Map {
             // Where the middle of a row of the grid lies among rows that reach from pole to pole
             let row = if poles { (y as f32 + 0.5) * (1.0 - 1.0 / height as f32) } else { y as f32 };
             let above = row as usize;
-            let one = |y: usize| Vec3::from_array(pixels[y.min(height - 1) * width + x]);
-            one(above).lerp(one(above + 1), row - above as f32)
+            let colour_at = |y: usize| Vec3::from_array(pixels[y.min(height - 1) * width + x]);
+            colour_at(above).lerp(colour_at(above + 1), row - above as f32)
         };
         let across = |x: usize, y: usize| {
             0.75 * at(x, y) + 0.125 * (at((x + 1) % width, y) + at((x + width - 1) % width, y))

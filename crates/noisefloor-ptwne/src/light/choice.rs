@@ -77,12 +77,12 @@ impl Lights {
     #[inline]
     pub(crate) fn prospect(&self, receiver: Receiver) -> Prospect {
         let mut prospect = Prospect::unknown(receiver);
-        self.look(&mut prospect);
+        self.weigh(&mut prospect);
         prospect
     }
 
     #[inline]
-    fn look(&self, prospect: &mut Prospect) {
+    fn weigh(&self, prospect: &mut Prospect) {
         if self.only.is_some() {
             return;
         }
@@ -113,9 +113,9 @@ impl Lights {
         let u = if geometric { u / share } else { (u - share) / (1.0 - share) };
 
         // Far lights first, then the tree
-        let of = |weights: Pmf| f64::from(if geometric { weights.geometric } else { weights.scattered });
-        let of_tree = of(prospect.tree);
-        let mut rest = u * (of(prospect.far) + of_tree);
+        let chosen = |weights: Pmf| f64::from(if geometric { weights.geometric } else { weights.scattered });
+        let of_tree = chosen(prospect.tree);
+        let mut rest = u * (chosen(prospect.far) + of_tree);
         for far in &self.far {
             let weight = f64::from(far.weight(&prospect.receiver, geometric));
             if rest < weight {
@@ -169,9 +169,9 @@ impl Prospect {
     /// The probability of what has these weights beside all other lights.
     #[inline]
     fn mixed(&self, weights: Pmf) -> f32 {
-        let of = |weight: f32, all: f32| if all > 0.0 { weight / all } else { 0.0 };
-        let scattered = of(weights.scattered, self.far.scattered + self.tree.scattered);
-        let geometric = of(weights.geometric, self.far.geometric + self.tree.geometric);
+        let share = |weight: f32, all: f32| if all > 0.0 { weight / all } else { 0.0 };
+        let scattered = share(weights.scattered, self.far.scattered + self.tree.scattered);
+        let geometric = share(weights.geometric, self.far.geometric + self.tree.geometric);
         (1.0 - GEOMETRIC_SHARE) * scattered + GEOMETRIC_SHARE * geometric
     }
 }

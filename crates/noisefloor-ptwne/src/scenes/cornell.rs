@@ -1,10 +1,10 @@
 //! The Cornell box (Goral et al. 1984), 2 units wide.
 
-use super::kit::{Kit, emission, look};
+use super::kit::{Kit, emission, look_at};
 use crate::{Scene, SceneError};
 
 pub(super) fn cornell_box(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 1.0, 3.82], [0.0, 1.0, 0.0], 39.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 1.0, 3.82], [0.0, 1.0, 0.0], 39.0))?;
     let white = k.diffuse([0.73, 0.73, 0.71])?;
     let red = k.diffuse([0.61, 0.06, 0.05])?;
     let green = k.diffuse([0.13, 0.44, 0.10])?;

@@ -1,11 +1,11 @@
 //! Mirrors, glass and caustics.
 
-use super::kit::{Kit, emission, look};
+use super::kit::{Kit, emission, look_at};
 use crate::{Material, Scene, SceneError, Texture};
 
 /// Balls of glass and mirror in a box, with caustics.
 pub(super) fn caustics(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 1.25, 4.35], [0.0, 0.92, 0.0], 36.5))?;
+    let mut k = Kit::new(name, look_at([0.0, 1.25, 4.35], [0.0, 0.92, 0.0], 36.5))?;
     let white = k.diffuse([0.74, 0.73, 0.70])?;
     let floor = Texture::Checker { colours: [[0.70, 0.68, 0.62], [0.30, 0.29, 0.30]], scale: [2.5, 2.5] };
     let floor = k.diffuse(floor)?;
@@ -32,7 +32,7 @@ pub(super) fn caustics(name: &str) -> Result<Scene, SceneError> {
 
 /// Plates of increasing roughness that reflect lights of increasing size (after Veach, Guibas 1995).
 pub(super) fn plates(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 2.6, 8.6], [0.0, 1.35, 0.0], 32.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 2.6, 8.6], [0.0, 1.35, 0.0], 32.0))?;
     let wall = k.diffuse([0.42, 0.42, 0.44])?;
     let tiles = Texture::Checker { colours: [[0.34, 0.34, 0.36], [0.22, 0.22, 0.24]], scale: [1.5, 1.5] };
     let tiles = k.diffuse(tiles)?;

@@ -1,13 +1,13 @@
 //! Halls: an arcade of brick and checkers, and a market under many lanterns.
 
-use super::kit::{Kit, emission, look};
+use super::kit::{Kit, emission, look_at};
 use crate::{Environment, Scene, SceneError, Sun, Texture};
 
 /// A hall with two arcades and an open roof: the sun falls in from above.
 // Longer than 60 lines: one list of what stands where.
 // Long: a list of what stands in the scene
 pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.35, 1.7, 8.6], [-0.25, 2.1, 0.0], 55.0))?;
+    let mut k = Kit::new(name, look_at([0.35, 1.7, 8.6], [-0.25, 2.1, 0.0], 55.0))?;
     let floor = Texture::Checker { colours: [[0.58, 0.54, 0.47], [0.24, 0.20, 0.18]], scale: [1.0, 1.0] };
     let floor = k.diffuse(floor)?;
     let brick = Texture::Brick { brick: [0.58, 0.33, 0.22], mortar: [0.60, 0.57, 0.52], scale: [1.7, 4.0] };
@@ -91,7 +91,7 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
 // Longer than 60 lines: one list of what stands where.
 // Long: a list of what stands in the scene
 pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.1, 1.8, 7.0], [0.0, 1.55, 0.0], 46.0))?;
+    let mut k = Kit::new(name, look_at([0.1, 1.8, 7.0], [0.0, 1.55, 0.0], 46.0))?;
     let cobbles = Texture::Brick { brick: [0.42, 0.40, 0.39], mortar: [0.20, 0.19, 0.18], scale: [2.6, 4.0] };
     let cobbles = k.diffuse(cobbles)?;
     let brick = Texture::Brick { brick: [0.60, 0.38, 0.28], mortar: [0.55, 0.45, 0.42], scale: [2.0, 4.5] };

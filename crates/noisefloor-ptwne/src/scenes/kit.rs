@@ -16,7 +16,7 @@ pub(super) struct Kit {
 }
 
 /// A camera for a scene with +y up.
-pub(super) fn look(eye: P, target: P, vertical_fov: f32) -> Camera {
+pub(super) fn look_at(eye: P, target: P, vertical_fov: f32) -> Camera {
     Camera { eye, target, up: [0.0, 1.0, 0.0], vertical_fov }
 }
 

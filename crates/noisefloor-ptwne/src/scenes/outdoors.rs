@@ -1,13 +1,13 @@
 //! Under the sky.
 
-use super::kit::{Kit, look};
+use super::kit::{Kit, look_at};
 use crate::{Environment, Scene, SceneError, Sun, Texture};
 
 /// A court with steps, an arcade and a well, in sun and sky.
 // Longer than 60 lines: one list of what stands where.
 // Long: a list of what stands in the scene
 pub(super) fn courtyard(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([5.2, 2.5, 8.4], [-0.5, 1.55, 0.0], 42.0))?;
+    let mut k = Kit::new(name, look_at([5.2, 2.5, 8.4], [-0.5, 1.55, 0.0], 42.0))?;
     let paving = Texture::Checker { colours: [[0.36, 0.33, 0.29], [0.28, 0.26, 0.24]], scale: [1.0, 1.0] };
     let paving = k.diffuse(paving)?;
     let brick = Texture::Brick { brick: [0.52, 0.23, 0.15], mortar: [0.55, 0.52, 0.47], scale: [2.2, 5.0] };

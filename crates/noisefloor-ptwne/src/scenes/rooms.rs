@@ -1,11 +1,11 @@
 //! Rooms: a small light, a large light, and light from behind a door.
 
-use super::kit::{Kit, emission, look};
+use super::kit::{Kit, emission, look_at};
 use crate::{Material, Scene, SceneError, Texture};
 
 /// A desk in a dim corner, under a bulb.
 pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.15, 1.75, 4.1], [0.0, 0.78, 0.0], 36.0))?;
+    let mut k = Kit::new(name, look_at([0.15, 1.75, 4.1], [0.0, 0.78, 0.0], 36.0))?;
     let wall = k.diffuse([0.52, 0.56, 0.58])?;
     let boards = Texture::Noise { colours: [[0.30, 0.17, 0.09], [0.55, 0.36, 0.20]], scale: [1.2, 14.0] };
     let boards = k.diffuse(boards)?;
@@ -58,7 +58,7 @@ pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
 
 /// A photographer's studio: metals of increasing roughness and a draped still life under a soft box.
 pub(super) fn softbox(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 1.5, 5.4], [0.0, 0.72, 0.0], 37.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 1.5, 5.4], [0.0, 0.72, 0.0], 37.0))?;
     let paper = k.diffuse([0.55, 0.55, 0.57])?;
     let checker = Texture::Checker { colours: [[0.65, 0.65, 0.62], [0.12, 0.13, 0.16]], scale: [4.0, 4.0] };
     let checker = k.diffuse(checker)?;
@@ -99,7 +99,7 @@ pub(super) fn softbox(name: &str) -> Result<Scene, SceneError> {
 
 /// A room lit through a door that stands ajar.
 pub(super) fn door(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([1.3, 1.45, 3.75], [-0.1, 0.95, -0.6], 48.0))?;
+    let mut k = Kit::new(name, look_at([1.3, 1.45, 3.75], [-0.1, 0.95, -0.6], 48.0))?;
     let wall = k.diffuse([0.78, 0.75, 0.68])?;
     let hall = k.diffuse([0.85, 0.85, 0.84])?;
     let floor = Texture::Checker { colours: [[0.62, 0.58, 0.50], [0.26, 0.20, 0.15]], scale: [2.5, 2.5] };

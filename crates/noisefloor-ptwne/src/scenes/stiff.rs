@@ -1,14 +1,14 @@
 //! Scenes that are hard for a renderer, each for one reason: light that light sampling cannot find, numbers
 //! that f32 cannot hold, and divisions by zero.
 
-use super::kit::{Kit, P, emission, look};
+use super::kit::{Kit, P, emission, look_at};
 use crate::{Environment, Material, Mesh, Scene, SceneError, Sun, Texture};
 use std::f32::consts::PI;
 
 /// A glass ball and a glass block between a small lamp and the floor. Only scattered rays find the lamp
 /// through glass.
 pub(super) fn caustic(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.3, 1.9, 4.2], [0.1, 0.45, 0.0], 36.0))?;
+    let mut k = Kit::new(name, look_at([0.3, 1.9, 4.2], [0.1, 0.45, 0.0], 36.0))?;
     let paper = k.diffuse([0.7, 0.68, 0.64])?;
     let slate = k.diffuse([0.2, 0.22, 0.25])?;
     let black = k.diffuse([0.0; 3])?;
@@ -25,7 +25,7 @@ pub(super) fn caustic(name: &str) -> Result<Scene, SceneError> {
 /// A dark room beside a bright one, joined by a keyhole of 6×12 cm. Nearly all shadow rays to the lamp are
 /// blocked.
 pub(super) fn keyhole(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([1.5, 1.3, 3.4], [-0.35, 0.8, 0.0], 48.0))?;
+    let mut k = Kit::new(name, look_at([1.5, 1.3, 3.4], [-0.35, 0.8, 0.0], 48.0))?;
     let wall = k.diffuse([0.75, 0.73, 0.70])?;
     let boards = Texture::Noise { colours: [[0.34, 0.22, 0.13], [0.52, 0.36, 0.22]], scale: [1.2, 14.0] };
     let boards = k.diffuse(boards)?;
@@ -59,7 +59,7 @@ pub(super) fn keyhole(name: &str) -> Result<Scene, SceneError> {
 
 /// A still life under a lamp of radius 1e-4.
 pub(super) fn pinpoint(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 1.6, 4.2], [0.0, 0.6, 0.0], 38.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 1.6, 4.2], [0.0, 0.6, 0.0], 38.0))?;
     let floor = Texture::Checker { colours: [[0.62, 0.60, 0.55], [0.34, 0.32, 0.30]], scale: [2.0, 2.0] };
     let floor = k.diffuse(floor)?;
     let white = k.diffuse([0.75; 3])?;
@@ -79,7 +79,7 @@ pub(super) fn pinpoint(name: &str) -> Result<Scene, SceneError> {
 /// Nine niches in a wall, each lit by a panel of its own. The radiance of the panels goes from 1e-8 to 1e8 in
 /// steps of 100.
 pub(super) fn decades(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 0.0, 7.0], [0.0, 0.0, 0.0], 28.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 0.0, 7.0], [0.0, 0.0, 0.0], 28.0))?;
     let grey = k.diffuse([0.6; 3])?;
     let black = k.diffuse([0.0; 3])?;
     for i in 0..9 {
@@ -100,7 +100,7 @@ pub(super) fn decades(name: &str) -> Result<Scene, SceneError> {
 /// Needles a thousand times as long as wide, as a drum around a bright lamp that must not shine through, and
 /// sheets of paper that are nearly parallel and nearly touch.
 pub(super) fn needles(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.2, 1.5, 4.4], [0.0, 0.55, 0.0], 36.0))?;
+    let mut k = Kit::new(name, look_at([0.2, 1.5, 4.4], [0.0, 0.55, 0.0], 36.0))?;
     let floor = k.diffuse([0.45, 0.43, 0.40])?;
     let teal = k.diffuse([0.12, 0.42, 0.46])?;
     let (paper, ink) = (k.diffuse([0.8, 0.78, 0.72])?, k.diffuse([0.25, 0.1, 0.1])?);
@@ -132,7 +132,7 @@ const FAR: P = [998_000.0, -999_000.0, 997_000.0];
 /// positions to 1/16.
 pub(super) fn far_away(name: &str) -> Result<Scene, SceneError> {
     let at = |p: P| [FAR[0] + p[0], FAR[1] + p[1], FAR[2] + p[2]];
-    let mut k = Kit::new(name, look(at([250.0, 420.0, 1150.0]), at([0.0, 150.0, 0.0]), 38.0))?;
+    let mut k = Kit::new(name, look_at(at([250.0, 420.0, 1150.0]), at([0.0, 150.0, 0.0]), 38.0))?;
     let stone = k.diffuse([0.55, 0.52, 0.47])?;
     let red = k.diffuse([0.60, 0.16, 0.10])?;
     let bronze = k.metal([0.72, 0.52, 0.30], 0.2)?;
@@ -158,7 +158,7 @@ pub(super) fn far_away(name: &str) -> Result<Scene, SceneError> {
 
 /// Hills of a million triangles in one mesh.
 pub(super) fn million(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 2.4, 6.4], [0.0, 0.1, 0.0], 38.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 2.4, 6.4], [0.0, 0.1, 0.0], 38.0))?;
     let earth = k.diffuse([0.46, 0.42, 0.34])?;
     k.sky(Environment {
         zenith: [0.16, 0.27, 0.56],
@@ -195,7 +195,7 @@ pub(super) fn million(name: &str) -> Result<Scene, SceneError> {
 /// A landing strip at dusk, seen from just above the ground: strips of metal and varnish, and lamps as low as
 /// the eye.
 pub(super) fn grazing(name: &str) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 0.1, 6.0], [0.0, 0.02, 4.0], 28.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 0.1, 6.0], [0.0, 0.02, 4.0], 28.0))?;
     let ground = k.diffuse([0.3, 0.3, 0.32])?;
     let black = k.diffuse([0.0; 3])?;
     k.sky(Environment {
@@ -236,7 +236,7 @@ pub(super) fn unlit(name: &str) -> Result<Scene, SceneError> {
 }
 
 fn still_life(name: &str, albedo: f32, lamp: bool) -> Result<Scene, SceneError> {
-    let mut k = Kit::new(name, look([0.0, 1.5, 4.0], [0.0, 0.5, 0.0], 38.0))?;
+    let mut k = Kit::new(name, look_at([0.0, 1.5, 4.0], [0.0, 0.5, 0.0], 38.0))?;
     let matt = k.diffuse([albedo; 3])?;
     let mirror = k.material(Material::Mirror { reflectance: [albedo; 3] })?;
     k.floor(0.0, [-3.0, 3.0], [-1.5, 6.0], true, matt, None);

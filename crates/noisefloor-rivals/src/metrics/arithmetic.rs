@@ -4,7 +4,7 @@ use crate::picture::MetricError;
 use noisefloor::Rgb;
 
 /// ε of [`relative_mse`], in the squared unit of its pictures.
-pub const RELATIVE_MSE_EPSILON: f64 = 0.01;
+pub(crate) const RELATIVE_MSE_EPSILON: f64 = 0.01;
 
 /// Mean over pixels and channels of (I − R)²/(R² + ε), ε = 0.01, of linear radiance (Rousselle, Knaus,
 /// Zwicker 2011, §5). Nothing is trimmed: a single firefly can dominate. Expose both pictures alike first, so

@@ -4,14 +4,11 @@ use crate::picture::{DifferenceMap, DisplayPixels, MetricError};
 use ::butteraugli::{ButteraugliParams, Img, RGB};
 use noisefloor::{Rgb, display::srgb_decode};
 
-/// Largest value of [`butteraugli()`] below which two pictures look the same, by its authors' scale.
-pub const BUTTERAUGLI_SAME: f64 = 1.0;
-
 /// Smallest edge of a picture for butteraugli.
 const BUTTERAUGLI_EDGE: usize = 8;
 
 /// Butteraugli of libjxl, in its port to Rust: a distance at each pixel, at 80 cd/m². Its authors' score is
-/// [`DifferenceMap::max`]; below [`BUTTERAUGLI_SAME`] pictures look the same. As an average they recommend
+/// [`DifferenceMap::max`]; below 1 pictures look the same. As an average they recommend
 /// the 3-norm ([`DifferenceMap::norm`]).
 ///
 /// # Errors

@@ -27,7 +27,7 @@ const SPECULAR: &str = "KHR_materials_specular";
 
 /// A material in the scene.
 #[derive(Clone, Debug)]
-pub(super) struct Look {
+pub(super) struct AddedMaterial {
     pub(super) id: MaterialId,
     pub(super) emission: Option<Emission>,
     /// Whether it shows its colour without any light.
@@ -44,26 +44,26 @@ pub(super) struct Materials<'a> {
     asset: &'a Asset<'a>,
     textures: Textures<'a>,
     /// By index, and what the corners of the mesh have.
-    looks: HashMap<(Option<usize>, Corners), Look>,
+    added: HashMap<(Option<usize>, Corners), AddedMaterial>,
 }
 
 impl<'a> Materials<'a> {
     pub(super) fn new(asset: &'a Asset<'a>) -> Self {
-        Self { asset, textures: Textures::new(asset), looks: HashMap::new() }
+        Self { asset, textures: Textures::new(asset), added: HashMap::new() }
     }
 
     /// The material of that index, named by `place`; or glTF's default material; times what `corners` have.
-    pub(super) fn look(
+    pub(super) fn material(
         &mut self,
         index: Option<Index<Source>>,
         corners: Corners,
         place: &Place,
         builder: &mut SceneBuilder,
         notes: &mut Notes,
-    ) -> Result<Look, LoadError> {
+    ) -> Result<AddedMaterial, LoadError> {
         let key = (index.map(|index| index.value()), corners);
-        if let Some(look) = self.looks.get(&key) {
-            return Ok(look.clone());
+        if let Some(added) = self.added.get(&key) {
+            return Ok(added.clone());
         }
         let default = Source::default();
         let (source, called) = match index {
@@ -86,9 +86,9 @@ impl<'a> Materials<'a> {
             None => builder.material_with(material, cover).map_err(refused)?,
             Some(coat) => coat.over(material, cover, builder).map_err(refused)?,
         };
-        let look = Look { id, emission, unlit, sets, normal_map };
-        self.looks.insert(key, look.clone());
-        Ok(look)
+        let added = AddedMaterial { id, emission, unlit, sets, normal_map };
+        self.added.insert(key, added.clone());
+        Ok(added)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::accessor::{floats, indices};
 use super::asset::Asset;
-use super::material::Look;
+use super::material::AddedMaterial;
 use crate::{LoadError, Place};
 use glam::{DAffine3, DMat3, DVec3};
 use gltf::json::accessor::Type;
@@ -60,7 +60,7 @@ pub(super) fn triangles(
     asset: &Asset<'_>,
     primitive: &Primitive,
     mode: Mode,
-    look: &Look,
+    material: &AddedMaterial,
     place: &Place,
 ) -> Result<Triangles, LoadError> {
     let positions = positions(asset, primitive, place)?;
@@ -90,14 +90,14 @@ pub(super) fn triangles(
             None => vec![],
         })
     };
-    let [uvs, second_uvs] = [coordinates(look.sets[0])?, coordinates(look.sets[1])?];
+    let [uvs, second_uvs] = [coordinates(material.sets[0])?, coordinates(material.sets[1])?];
     let (colours, alphas) = match alike(attribute(primitive, Semantic::Colors(0)), "colours")? {
         Some(colours) => colours_of(asset, colours, place)?,
         None => (vec![], vec![]),
     };
     // Without normals, tangents are to be ignored (glTF 2.0, §3.7.2.1)
     let tangents =
-        attribute(primitive, Semantic::Tangents).filter(|_| look.normal_map && !normals.is_empty());
+        attribute(primitive, Semantic::Tangents).filter(|_| material.normal_map && !normals.is_empty());
     let tangents = match alike(tangents, "tangents")? {
         Some(tangents) => floats::<4>(asset, tangents, place)?,
         None => vec![],

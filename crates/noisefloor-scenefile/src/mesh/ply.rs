@@ -53,7 +53,7 @@ pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> 
     if let Some(attribute) = attribute.filter(|_| coloured.is_none()) {
         return Err(place.bad(format_args!("the mesh has no attribute `{attribute}`")));
     }
-    let of = |element: &Element| wanted.filter(|(of, _)| *of == element.name).map(|(_, name)| name);
+    let wanted_of = |element: &Element| wanted.filter(|(of, _)| *of == element.name).map(|(_, name)| name);
     let colour = |values: [f32; 3]| if coloured == Some(true) { values } else { [values[0]; 3] };
 
     let mut mesh = Triangles::default();
@@ -73,7 +73,7 @@ pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> 
                     "nx" | "ny" | "nz" => Some(3 + usize::from(name.as_bytes()[1] - b'x')),
                     _ => match uvs.and_then(|names| names.iter().position(|n| *n == name)) {
                         Some(at) => Some(6 + at),
-                        None => of(element).and_then(|of| channel(name, of)).map(|at| 8 + at),
+                        None => wanted_of(element).and_then(|of| channel(name, of)).map(|at| 8 + at),
                     },
                 });
                 for index in 0..element.count {
@@ -90,12 +90,12 @@ pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> 
                     mesh.positions.push([x, y, z]);
                     mesh.normals.extend(normals.then_some([nx, ny, nz]));
                     mesh.uvs.extend(uvs.map(|_| [u, v]));
-                    mesh.colours.extend(of(element).map(|_| colour([r, g, b])));
+                    mesh.colours.extend(wanted_of(element).map(|_| colour([r, g, b])));
                 }
             }
             "face" | "tristrips" => {
                 let strips = element.name == "tristrips";
-                let slots = element.slots(|name| of(element).and_then(|of| channel(name, of)));
+                let slots = element.slots(|name| wanted_of(element).and_then(|of| channel(name, of)));
                 for index in 0..element.count {
                     let (mut row, start) = ([0.0; 3], faces.corners.len());
                     for (property, slot) in element.properties.iter().zip(&slots) {
@@ -121,7 +121,7 @@ pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> 
                         return Err(place.bad(what));
                     } else {
                         faces.ends.push(faces.corners.len());
-                        faces.colours.extend(of(element).map(|_| colour(row)));
+                        faces.colours.extend(wanted_of(element).map(|_| colour(row)));
                     }
                 }
             }

@@ -1,13 +1,13 @@
 //! Surfaces: Mitsuba's `bsdf` elements.
 
 use super::context::Context;
-use super::surface::{Body, Surface};
 use super::textures::peak;
 use super::xml::Element;
 use crate::colour::Quantity;
 use crate::error::LoadError;
+use crate::indices;
 use noisefloor::Rgb;
-use noisefloor_ptwne::{Facets, Lobes, Material, Relief, Texture};
+use noisefloor_ptwne::{Dialect, Facets, Lobes, Material, Principled, Relief, Texture};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Most surfaces that one mixes, whatever they are mixed of.
@@ -255,5 +255,440 @@ impl<'d> Context<'d> {
         let facets = Facets::BeckmannUncorrelated;
         let glossy = Surface { facets, alphas, ..Surface::one_sided(glossy) };
         Ok(Surface::blend(first, glossy, Texture::Colour([share; 3])))
+    }
+}
+
+// What a shape's surface is made of.
+
+/// A material, or a blend of two surfaces, and what it lets through.
+#[derive(Clone, Debug)]
+pub(super) struct Surface {
+    pub(super) body: Body,
+    /// Where the surface is; everywhere if there is none.
+    pub(super) opacity: Option<Texture>,
+    /// Whether it is black from behind.
+    pub(super) one_sided: bool,
+    /// Its microfacets.
+    pub(super) facets: Facets,
+    /// α of its microfacets along and across u, instead of the material's number.
+    pub(super) alphas: Option<Texture>,
+    /// Its bumps, and of a blend those of its parts that have none.
+    pub(super) relief: Option<Relief>,
+}
+
+/// What reflects.
+#[derive(Clone, Debug)]
+pub(super) enum Body {
+    Plain(Material),
+    /// The first of them, but for the share of the second.
+    Blend(Box<[Surface; 2]>, Texture),
+}
+
+impl Surface {
+    /// What reflects, and is black from behind.
+    pub(super) fn one_sided(material: Material) -> Self {
+        let (body, facets) = (Body::Plain(material), Facets::GgxUncorrelated);
+        Self { body, opacity: None, one_sided: true, facets, alphas: None, relief: None }
+    }
+
+    /// What is seen from both sides.
+    pub(super) fn two_sided(material: Material) -> Self {
+        Self { one_sided: false, ..Self::one_sided(material) }
+    }
+
+    /// `share` of the second surface, and the rest of the first.
+    pub(super) fn blend(first: Self, second: Self, share: Texture) -> Self {
+        let one_sided = first.one_sided && second.one_sided;
+        let body = Body::Blend(Box::new([first, second]), share);
+        Self { body, opacity: None, one_sided, facets: Facets::default(), alphas: None, relief: None }
+    }
+
+    /// How many surfaces it is mixed of.
+    pub(super) fn parts(&self) -> usize {
+        match &self.body {
+            Body::Plain(_) => 1,
+            Body::Blend(parts, _) => parts.iter().map(Self::parts).sum(),
+        }
+    }
+
+    /// What Mitsuba gives shapes without a surface: grey, or, if they shine, black.
+    pub(super) fn missing(shines: bool) -> Self {
+        Self::one_sided(Material::diffuse([if shines { 0.0 } else { 0.5 }; 3]))
+    }
+
+    /// What lets all light through.
+    pub(super) fn nothing() -> Self {
+        let opacity = Some(Texture::Colour([0.0; 3]));
+        Self { opacity, ..Self::two_sided(Material::diffuse([0.0; 3])) }
+    }
+
+    /// The same from both sides.
+    pub(super) fn seen_from_both_sides(mut self) -> Self {
+        self.one_sided = false;
+        if let Body::Blend(parts, _) = &mut self.body {
+            **parts = (**parts).clone().map(Self::seen_from_both_sides);
+        }
+        self
+    }
+
+    /// The surface that looks from its front as this one does from its back.
+    pub(super) fn inside_out(mut self) -> Self {
+        match &mut self.body {
+            Body::Plain(Material::Glass { ior, .. } | Material::RoughGlass { ior, .. }) => *ior = ior.recip(),
+            Body::Plain(_) => {}
+            Body::Blend(parts, _) => **parts = (**parts).clone().map(Self::inside_out),
+        }
+        self
+    }
+
+    /// Whether it has a texture, or runs along texture coordinates.
+    pub(super) fn is_textured(&self) -> bool {
+        let varies = |texture: &Texture| !matches!(texture, Texture::Colour(_));
+        self.relief.is_some()
+            || self.alphas.is_some()
+            || self.opacity.as_ref().is_some_and(varies)
+            || match &self.body {
+                Body::Blend(parts, share) => varies(share) || parts.iter().any(Self::is_textured),
+                Body::Plain(material) => match material {
+                    Material::Diffuse { albedo: texture }
+                    | Material::Plastic { diffuse: texture, .. }
+                    | Material::RoughConductor { reflectance: texture, .. }
+                    | Material::Conductor { reflectance: texture, .. } => varies(texture),
+                    Material::Lobes(lobes) => varies(&lobes.diffuse),
+                    Material::Principled(surface) => {
+                        varies(&surface.base)
+                            || varies(&surface.metallic_roughness)
+                            || surface.anisotropic > 0.0
+                    }
+                    _ => false,
+                },
+            }
+    }
+}
+
+// Surfaces with indices of refraction: conductors, dielectrics and plastics.
+
+impl<'d> Context<'d> {
+    pub(super) fn plastic(&self, element: &'d Element) -> Result<Material, LoadError> {
+        if element.kind() == "pplastic" {
+            self.approximated(element, "the polarisation of <bsdf type=\"pplastic\"> is left out");
+        }
+        let rough = element.kind() == "roughplastic" || element.has("alpha");
+        Ok(Material::Plastic {
+            diffuse: self.factor(element, "diffuse_reflectance", 0.5)?,
+            specular: self.constant_factor(element, "specular_reflectance", 1.0)?,
+            ior: self.relative_ior(element, "polypropylene")?,
+            roughness: if rough { self.plain_roughness(element)? } else { 0.0 },
+            nonlinear: self.boolean(element, "nonlinear", false)?,
+        })
+    }
+
+    pub(super) fn conductor(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let rough = element.kind() == "roughconductor";
+        let reflectance = self.factor(element, "specular_reflectance", 1.0)?;
+        let (roughness, alphas) = self.roughness(element, rough)?;
+        let facets = self.facets(element)?;
+        let surface = |material| Surface { facets, alphas, ..Surface::one_sided(material) };
+
+        // η and k, or the name of a metal
+        let given =
+            [self.signed(element, "eta", Quantity::Factor)?, self.signed(element, "k", Quantity::Factor)?];
+        let (eta, k) = match (given, self.string(element, "material")?) {
+            // Given and named, the numbers count
+            ([Some(eta), Some(k)], _) => (eta, k),
+            ([None, None], Some("none")) => match reflectance {
+                Texture::Colour(reflectance) if !rough => {
+                    return Ok(surface(Material::Mirror { reflectance }));
+                }
+                // Reflects all light at all angles
+                _ => ([0.0; 3], [1.0; 3]),
+            },
+            ([None, None], name) => {
+                // Mitsuba 0.6 took copper where nothing was said, Mitsuba 3 a perfect mirror
+                let missing = if self.document.old { "Cu" } else { "none" };
+                let name = name.unwrap_or(missing);
+                match (name, &reflectance) {
+                    ("none", Texture::Colour(reflectance)) if !rough => {
+                        return Ok(surface(Material::Mirror { reflectance: *reflectance }));
+                    }
+                    ("none", _) => ([0.0; 3], [1.0; 3]),
+                    _ => indices::conductor(name).ok_or_else(|| {
+                        let known: Vec<&str> = indices::CONDUCTORS.iter().map(|metal| metal.0).collect();
+                        let known = known.join(", ");
+                        let what = format!("the metal `{name}` (known: none, {known}; or give eta and k)");
+                        self.unsupported(element, what)
+                    })?,
+                }
+            }
+            _ => return Err(self.bad(element, "give both `eta` and `k`, or `material`")),
+        };
+        // Relative to what is outside
+        let outside = self.ior(element, "ext_eta", "vacuum")? as f32;
+        let relative = |index: Rgb| index.map(|n| n / outside);
+        let (eta, k) = (self.clamped(element, "eta", relative(eta)), self.clamped(element, "k", relative(k)));
+        Ok(surface(Material::Conductor { eta, k, reflectance, roughness }))
+    }
+
+    pub(super) fn glass(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let reflectance = self.constant_factor(element, "specular_reflectance", 1.0)?;
+        if reflectance != [1.0; 3] {
+            self.ignored(element, format!("`specular_reflectance` {reflectance:?} is ignored: it is 1"));
+        }
+        let tint = self.constant_factor(element, "specular_transmittance", 1.0)?;
+        let ior = self.relative_ior(element, "bk7")?;
+        let facets = self.facets(element)?;
+        let body = match element.kind() {
+            "thindielectric" => Material::ThinGlass { ior, tint },
+            // Mitsuba lets light through unbent
+            _ if (ior - 1.0).abs() < 1e-6 => Material::ThinGlass { ior, tint },
+            "roughdielectric" => {
+                let (roughness, alphas) = self.roughness(element, true)?;
+                let body = Material::RoughGlass { ior, tint, roughness };
+                return Ok(Surface { facets, alphas, ..Surface::two_sided(body) });
+            }
+            _ => Material::Glass { ior, tint },
+        };
+        Ok(Surface { facets, ..Surface::two_sided(body) })
+    }
+
+    /// The distribution of microfacets. Phong's is one of lobes, which Beckmann's comes close to.
+    pub(super) fn facets(&self, element: &'d Element) -> Result<Facets, LoadError> {
+        match self.string(element, "distribution")?.unwrap_or("beckmann") {
+            "ggx" => Ok(Facets::GgxUncorrelated),
+            "beckmann" => Ok(Facets::BeckmannUncorrelated),
+            other => {
+                self.approximated(element, format!("the distribution `{other}` is replaced by `beckmann`"));
+                Ok(Facets::BeckmannUncorrelated)
+            }
+        }
+    }
+
+    /// α, or a texture of it along and across u: of `alpha`, or of `alpha_u` and `alpha_v`.
+    pub(super) fn roughness(
+        &self,
+        element: &'d Element,
+        rough: bool,
+    ) -> Result<(f32, Option<Texture>), LoadError> {
+        if !rough {
+            return Ok((0.0, None));
+        }
+        element.ignore(&["sample_visible"]);
+        let [u, v] = if element.has("alpha_u") || element.has("alpha_v") {
+            let missing = if element.has("alpha") { self.mean_float(element, "alpha")? } else { None };
+            let missing = missing.unwrap_or(0.1) as f32;
+            [self.grey(element, "alpha_u", missing)?, self.grey(element, "alpha_v", missing)?]
+        } else {
+            let alpha = self.grey(element, "alpha", 0.1)?;
+            [alpha.clone(), alpha]
+        };
+        self.along_and_across(element, [&u, &v])
+    }
+
+    /// Two numbers or textures of α as one, which is a number if they are the same everywhere.
+    pub(super) fn along_and_across(
+        &self,
+        element: &Element,
+        [u, v]: [&Texture; 2],
+    ) -> Result<(f32, Option<Texture>), LoadError> {
+        let alphas = self.joined(element, [u, v], |[u, v]| [u, v, 0.0])?;
+        Ok(match alphas {
+            Texture::Colour([u, v, _]) if u == v => (u, None),
+            Texture::Colour([u, v, _]) => ((u * v).sqrt(), Some(alphas)),
+            other => {
+                let [u, v, _] = self.means.of(&other);
+                ((u * v).sqrt(), Some(other))
+            }
+        })
+    }
+
+    /// One α for all directions and places.
+    pub(super) fn plain_roughness(&self, element: &'d Element) -> Result<f32, LoadError> {
+        match self.roughness(element, true)? {
+            (alpha, None) => Ok(alpha),
+            (alpha, Some(_)) => {
+                self.approximated(element, "roughness that varies is replaced by its mean");
+                Ok(alpha)
+            }
+        }
+    }
+
+    /// A number of 0…1 or a texture of it.
+    pub(super) fn grey(&self, element: &'d Element, name: &str, missing: f32) -> Result<Texture, LoadError> {
+        let texture = match element.get(name) {
+            Some(child) if !matches!(child.tag.as_str(), "float" | "integer") => {
+                self.factor(element, name, missing)?
+            }
+            _ => {
+                let number = self.float(element, name)?.unwrap_or(f64::from(missing));
+                if !(0.0..=1.0).contains(&number) {
+                    self.approximated(element, format!("`{name}` is {number}, and is brought into 0…1"));
+                }
+                return Ok(Texture::Colour([number.clamp(0.0, 1.0) as f32; 3]));
+            }
+        };
+        let texture = self.varying(element, texture)?;
+        self.one_channel(element, texture)
+    }
+
+    /// An index of refraction of a conductor, at least 0, with a warning if it is not.
+    fn clamped(&self, element: &Element, name: &str, index: Rgb) -> Rgb {
+        let nearest = index.map(|n| n.clamp(0.0, 100.0));
+        if nearest != index {
+            self.approximated(element, format!("`{name}` is {index:?}, and is brought into 0…100"));
+        }
+        nearest
+    }
+
+    /// A number; of a colour the mean of its channels, as in Mitsuba; of a texture its mean, with a warning.
+    pub(super) fn mean_float(&self, element: &'d Element, name: &str) -> Result<Option<f64>, LoadError> {
+        let number = |child: &&Element| matches!(child.tag.as_str(), "float" | "integer");
+        match element.get(name).filter(|child| !number(child)) {
+            Some(_) => {
+                let mean = self.constant_factor(element, name, 0.0)?;
+                Ok(Some(f64::from(mean.iter().sum::<f32>() / 3.0)))
+            }
+            None => self.float(element, name),
+        }
+    }
+
+    /// Index of refraction of the inside over that of the outside.
+    pub(super) fn relative_ior(&self, element: &'d Element, inside: &str) -> Result<f32, LoadError> {
+        let (inside, outside) = (self.ior(element, "int_ior", inside)?, self.ior(element, "ext_ior", "air")?);
+        Ok((inside / outside) as f32)
+    }
+
+    /// An index of refraction above 0: a number or a name, or else that of `default`.
+    fn ior(&self, element: &'d Element, name: &str, default: &str) -> Result<f64, LoadError> {
+        let found = match element.get(name) {
+            None => indices::dielectric(default),
+            Some(child) if child.tag == "string" => {
+                let material = child.attribute("value").unwrap_or_default();
+                Some(indices::dielectric(material).ok_or_else(|| {
+                    let known: Vec<&str> = indices::DIELECTRICS.iter().map(|index| index.0).collect();
+                    self.unsupported(
+                        child,
+                        format!("the material `{material}` (known: {})", known.join(", ")),
+                    )
+                })?)
+            }
+            Some(_) => self.float(element, name)?,
+        };
+        let found = found.filter(|ior| *ior > 0.0);
+        found.ok_or_else(|| self.bad(element, format!("`{name}` must be above 0")))
+    }
+}
+
+// Disney's principled surface (Burley 2012, 2015) as Mitsuba 3 has it.
+
+/// What the surface is beside a diffuse and a glossy reflection.
+struct Glass {
+    /// Share of what is no metal.
+    share: f64,
+    thin: bool,
+    ior: f32,
+}
+
+impl<'d> Context<'d> {
+    /// `principled` or `principledthin`.
+    pub(super) fn principled(&self, element: &'d Element) -> Result<Surface, LoadError> {
+        let thin = element.kind() == "principledthin";
+        if thin {
+            self.approximated(
+                element,
+                "of <bsdf type=\"principledthin\"> what is seen from behind is left out, but for a pane",
+            );
+            element.ignore(&["diff_trans"]);
+        }
+        element.ignore(&[
+            "diffuse_reflectance_sampling_rate",
+            "specular_reflectance_sampling_rate",
+            "clearcoat_sampling_rate",
+            "main_specular_sampling_rate",
+        ]);
+        let number = |name: &str, missing: f64| {
+            let number = self.mean_float(element, name)?.unwrap_or(missing);
+            if !(0.0..=1.0).contains(&number) {
+                self.approximated(element, format!("`{name}` is {number}, and is brought into 0…1"));
+            }
+            Ok::<_, LoadError>(number.clamp(0.0, 1.0))
+        };
+        let ior = self.principled_ior(element)?;
+        let base = self.factor(element, "base_color", 0.5)?;
+        let (roughness, metal) =
+            (self.grey(element, "roughness", 0.5)?, self.grey(element, "metallic", 0.0)?);
+        let surface = Principled {
+            base: base.clone(),
+            metallic_roughness: self.joined(element, [&roughness, &metal], |[r, m]| [1.0, r, m])?,
+            ior: ior.clamp(1.0, 4.0),
+            anisotropic: number("anisotropic", 0.0)? as f32,
+            specular_tint: number("spec_tint", 0.0)? as f32,
+            sheen: number("sheen", 0.0)? as f32,
+            sheen_tint: number("sheen_tint", 0.0)? as f32,
+            flatness: number("flatness", 0.0)? as f32,
+            clearcoat: number("clearcoat", 0.0)? as f32,
+            clearcoat_gloss: number("clearcoat_gloss", 0.0)? as f32,
+            dialect: Dialect::Mitsuba,
+        };
+        match number("spec_trans", 0.0)? {
+            0.0 => Ok(Surface::one_sided(surface.into())),
+            share => self.with_glass(element, surface, [&roughness, &metal], Glass { share, thin, ior }),
+        }
+    }
+
+    fn principled_ior(&self, element: &'d Element) -> Result<f32, LoadError> {
+        let ior = match self.float(element, "eta")? {
+            Some(eta) => eta,
+            // Burley 2012: 0.08·specular at normal incidence
+            None => {
+                let specular = self.mean_float(element, "specular")?.unwrap_or(0.5);
+                let root = (0.08 * specular).max(0.0).sqrt().min(0.9);
+                (1.0 + root) / (1.0 - root)
+            }
+        };
+        if !(0.25..=4.0).contains(&ior) {
+            self.approximated(element, format!("an index of refraction of {ior} is brought into 0.25…4"));
+        }
+        Ok(ior.clamp(0.25, 4.0) as f32)
+    }
+
+    /// A mix with glass. It is exact: with metal m and transmission t, the glass has the share s = (1 − m)t,
+    /// with its part of the dielectric's reflection, and the rest is a surface of metal m/(1 − s).
+    fn with_glass(
+        &self,
+        element: &'d Element,
+        surface: Principled,
+        [roughness, metal]: [&Texture; 2],
+        Glass { share, thin, ior }: Glass,
+    ) -> Result<Surface, LoadError> {
+        if !matches!(metal, Texture::Colour(_)) {
+            let what = "the texture of `metallic` counts by its mean in how much is transmitted";
+            self.approximated(element, what);
+        }
+        if matches!(surface.base, Texture::Image(_)) {
+            self.approximated(element, "the tint of transmitted light is the mean of `base_color`");
+        }
+        let tint = self.means.of(&surface.base).map(f32::sqrt);
+        let metallic = self.means.of(metal)[0];
+        let share = (1.0 - metallic) * share as f32;
+        let aspect = (1.0 - 0.9 * surface.anisotropic).sqrt();
+        let square = |r: f32| [r * r / aspect, r * r * aspect, 0.0];
+        let alphas = self.joined(element, [roughness], |[r]| square(r))?;
+        let glass = match alphas {
+            _ if thin => Surface::two_sided(Material::ThinGlass { ior, tint }),
+            Texture::Colour([u, v, _]) if u == v => {
+                Surface::two_sided(Material::RoughGlass { ior, tint, roughness: u })
+            }
+            alphas => {
+                let body = Material::RoughGlass { ior, tint, roughness: self.means.of(&alphas)[0] };
+                Surface { alphas: Some(alphas), ..Surface::two_sided(body) }
+            }
+        };
+        if share >= 1.0 {
+            return Ok(glass);
+        }
+        let rest = metallic / (1.0 - share);
+        let metallic_roughness = self.joined(element, [roughness], |[r]| [1.0, r, rest])?;
+        let surface = Surface::one_sided(Principled { metallic_roughness, ..surface }.into());
+        Ok(Surface::blend(surface, glass, Texture::Colour([share; 3])))
     }
 }

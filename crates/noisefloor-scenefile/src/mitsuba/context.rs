@@ -1,15 +1,16 @@
-//! What the readers of all parts of a scene share.
+//! What the readers of all parts of a scene share: references, warnings, limits, and the leaves: numbers,
+//! names, points and transforms.
 
-use super::attributes::Attribute;
+use super::bsdfs::Surface;
 use super::document::{Document, unset};
-use super::raster::Raster;
-use super::surface::Surface;
+use super::shapes::Attribute;
+use super::textures::Raster;
 use super::xml::Element;
 use crate::bounds::Bounds;
 use crate::channels::Means;
 use crate::error::{LoadError, Place, Warning};
-use crate::options::LoadOptions;
-use crate::options::NO_MEDIA;
+use crate::options::{LoadOptions, NO_MEDIA};
+use glam::{DMat3, DMat4, DVec3};
 use noisefloor_ptwne::{Facets, Material, SceneError, Texture};
 use std::cell::{Cell, RefCell};
 use std::collections::{HashMap, HashSet};
@@ -264,4 +265,180 @@ impl<'d> Context<'d> {
         });
         Ok(())
     }
+}
+
+// Numbers, switches, names and points of an element.
+
+impl Context<'_> {
+    /// The value of a `float` or `integer`.
+    pub(super) fn float(&self, object: &Element, name: &str) -> Result<Option<f64>, LoadError> {
+        self.value(object, name, &["float", "integer"])?.map(|(e, value)| self.number(e, value)).transpose()
+    }
+
+    /// The value of an `integer`.
+    pub(super) fn integer(&self, object: &Element, name: &str) -> Result<Option<i64>, LoadError> {
+        let Some((element, value)) = self.value(object, name, &["integer"])? else { return Ok(None) };
+        let number = value.trim().parse().ok();
+        number.map(Some).ok_or_else(|| self.bad(element, format!("`{value}` is not an integer")))
+    }
+
+    /// The value of a `boolean`, or else `default`.
+    pub(super) fn boolean(&self, object: &Element, name: &str, default: bool) -> Result<bool, LoadError> {
+        match self.value(object, name, &["boolean"])? {
+            None => Ok(default),
+            Some((element, value)) => match value.trim().to_ascii_lowercase().as_str() {
+                "true" => Ok(true),
+                "false" => Ok(false),
+                _ => Err(self.bad(element, format!("`{value}` is neither true nor false"))),
+            },
+        }
+    }
+
+    /// The value of a `string`.
+    pub(super) fn string<'e>(&self, object: &'e Element, name: &str) -> Result<Option<&'e str>, LoadError> {
+        Ok(self.value(object, name, &["string"])?.map(|(_, value)| value))
+    }
+
+    /// The value of a `point` or `vector`.
+    pub(super) fn point(&self, object: &Element, name: &str) -> Result<Option<DVec3>, LoadError> {
+        let Some(element) = object.get(name) else { return Ok(None) };
+        if element.tag != "point" && element.tag != "vector" {
+            return Err(
+                self.bad(element, format!("`{name}` is a <{}>; expected a point or vector", element.tag))
+            );
+        }
+        self.triple(element, 0.0).map(Some)
+    }
+
+    /// Attributes `x`, `y` and `z`, of which those that are missing are `missing`, or one or three numbers in
+    /// `value`.
+    pub(super) fn triple(&self, element: &Element, missing: f64) -> Result<DVec3, LoadError> {
+        if let Some(value) = element.attribute("value") {
+            return match self.numbers(element, value)?.as_slice() {
+                [all] => Ok(DVec3::splat(*all)),
+                [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
+                other => Err(self.bad(element, format!("{} numbers; expected 1 or 3", other.len()))),
+            };
+        }
+        let axis = |name| element.attribute(name).map_or(Ok(missing), |value| self.number(element, value));
+        Ok(DVec3::new(axis("x")?, axis("y")?, axis("z")?))
+    }
+
+    /// The element called `name`, which must have one of the `tags`, and its value.
+    pub(super) fn value<'e>(
+        &self,
+        object: &'e Element,
+        name: &str,
+        tags: &[&str],
+    ) -> Result<Option<(&'e Element, &'e str)>, LoadError> {
+        let Some(element) = object.get(name) else { return Ok(None) };
+        if !tags.contains(&element.tag.as_str()) {
+            let what = format!("`{name}` is a <{}>; expected <{}>", element.tag, tags.join(">, <"));
+            return Err(self.bad(element, what));
+        }
+        match element.attribute("value") {
+            Some(value) => Ok(Some((element, value))),
+            None => Err(self.bad(element, format!("`{name}` has no value"))),
+        }
+    }
+
+    /// Numbers separated by spaces or commas.
+    pub(super) fn numbers(&self, element: &Element, text: &str) -> Result<Vec<f64>, LoadError> {
+        let words = text.split(|c: char| c == ',' || c.is_ascii_whitespace()).filter(|word| !word.is_empty());
+        words.map(|word| self.number(element, word)).collect()
+    }
+
+    pub(super) fn number(&self, element: &Element, text: &str) -> Result<f64, LoadError> {
+        let number = text.trim().parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| self.bad(element, format!("`{text}` is not a finite number")))
+    }
+}
+
+// Transforms.
+
+impl Context<'_> {
+    /// The value of a `transform`, or else the identity.
+    pub(super) fn transform(&self, object: &Element, name: &str) -> Result<DMat4, LoadError> {
+        let Some(element) = object.get(name) else { return Ok(DMat4::IDENTITY) };
+        if element.tag != "transform" {
+            return Err(self.bad(element, format!("`{name}` is a <{}>; expected a transform", element.tag)));
+        }
+        let mut result = DMat4::IDENTITY;
+        for step in &element.children {
+            step.read();
+            // What comes later in the file is done later
+            result = self.step(step)? * result;
+        }
+        if result.is_finite() { Ok(result) } else { Err(self.bad(element, "the transform is too large")) }
+    }
+
+    /// One step of a transform.
+    fn step(&self, step: &Element) -> Result<DMat4, LoadError> {
+        match step.tag.as_str() {
+            "translate" => Ok(DMat4::from_translation(self.triple(step, 0.0)?)),
+            "scale" => Ok(DMat4::from_scale(self.triple(step, 1.0)?)),
+            "rotate" => {
+                let angle =
+                    step.attribute("angle").ok_or_else(|| self.bad(step, "a rotation needs an angle"))?;
+                let angle = self.number(step, angle)?;
+                let given = self.triple(step, 0.0)?;
+                let axis = given.try_normalize();
+                let axis = axis.ok_or_else(|| self.bad(step, "a rotation needs an axis that is not 0"))?;
+                let length = given.length();
+                if self.document.old || (length - 1.0).abs() < 1e-3 {
+                    return Ok(DMat4::from_axis_angle(axis, angle.to_radians()));
+                }
+                let what = format!("an axis of length {length:.3} stretches what it turns, as in Mitsuba 3");
+                self.approximated(step, what);
+                Ok(DMat4::from_mat3(stretched(given, angle.to_radians())))
+            }
+            "matrix" => self.matrix(step),
+            "lookat" | "lookAt" => self.look_at(step),
+            _ => Err(self.unsupported(step, format!("{} in a transform", step.label()))),
+        }
+    }
+
+    /// Row-major: 16 numbers, or 9 without translation.
+    fn matrix(&self, step: &Element) -> Result<DMat4, LoadError> {
+        let numbers = self.numbers(step, step.attribute("value").unwrap_or_default())?;
+        if let Ok(rows) = <&[f64; 16]>::try_from(numbers.as_slice()) {
+            if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
+                return Err(self.unsupported(step, "a matrix whose last row is not 0 0 0 1"));
+            }
+            return Ok(DMat4::from_cols_array(rows).transpose());
+        }
+        match <&[f64; 9]>::try_from(numbers.as_slice()) {
+            Ok(rows) => Ok(DMat4::from_mat3(DMat3::from_cols_array(rows).transpose())),
+            Err(_) => Err(self.bad(step, format!("{} numbers; a matrix has 9 or 16", numbers.len()))),
+        }
+    }
+
+    /// +z looks from `origin` to `target`, +y is up, and so +x is to the left.
+    fn look_at(&self, step: &Element) -> Result<DMat4, LoadError> {
+        let point = |name: &str| match step.attribute(name).map(|value| self.numbers(step, value)) {
+            Some(numbers) => match numbers?.as_slice() {
+                [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
+                _ => Err(self.bad(step, format!("`{name}` is not three numbers"))),
+            },
+            None if name == "up" => Ok(DVec3::Y),
+            None => Err(self.bad(step, format!("`{name}` is missing"))),
+        };
+        let (origin, target, up) = (point("origin")?, point("target")?, point("up")?);
+        let view = (target - origin).try_normalize();
+        let left = view.and_then(|view| up.cross(view).try_normalize().map(|left| (view, left)));
+        let (view, left) = left
+            .ok_or_else(|| self.bad(step, "origin and target are the same, or `up` points along the view"))?;
+        let up = view.cross(left);
+        Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), view.extend(0.0), origin.extend(1.0)))
+    }
+}
+
+/// Rodrigues' formula for an axis of any length, which Mitsuba 3 does not bring to 1 (version 0.6 did): cos
+/// θ·I + (1 − cos θ)·a·aᵀ + sin θ·[a]×.
+fn stretched(a: DVec3, angle: f64) -> DMat3 {
+    let (sin, cos) = angle.sin_cos();
+    let outer = DMat3::from_cols(a * a.x, a * a.y, a * a.z);
+    let cross = DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z));
+    // a × e is the column of [a]× for e
+    DMat3::IDENTITY * cos + outer * (1.0 - cos) + cross * sin
 }

@@ -1,14 +1,15 @@
-//! Shapes.
+//! Shapes, groups of them and their instances, and what they fill.
 
+use super::bsdfs::{Body, Surface};
 use super::context::Context;
-use super::filling::Filling;
-use super::surface::{Body, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
-use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized, solids};
+use crate::mesh::{Triangles, normal_matrix, obj, ply, rows, serialized, solids};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, SceneBuilder, SceneError};
+use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, ObjectId, SceneBuilder, SceneError};
+use std::collections::HashMap;
+use std::path::Path;
 use std::rc::Rc;
 
 /// Centre and axes of a disk, whose front is where their cross product points, and whether the angle of its
@@ -342,4 +343,186 @@ struct Sphere {
     axes: [[f32; 3]; 3],
     /// Whether its front is inside.
     inside_out: bool,
+}
+
+// What shapes and groups fill.
+
+/// The scene that is being filled.
+pub(super) struct Filling<'d> {
+    pub(super) builder: SceneBuilder,
+    /// Materials in it, by the serial number of their element, and whether they are inside out; and whether
+    /// they have a texture.
+    pub(super) materials: HashMap<(usize, bool), (MaterialId, bool)>,
+    /// Meshes of groups that shine, by the serial number of their element.
+    pub(super) meshes: HashMap<usize, Rc<Triangles>>,
+    /// Triangles that are not in a file but made of what is.
+    pub(super) made: u64,
+    /// Spheres that ellipsoids of a material share.
+    pub(super) balls: HashMap<MaterialId, ObjectId>,
+    /// Whether shapes are added to what the instances of a group share.
+    pub(super) in_group: bool,
+    /// Groups that have been shown, by the serial number of their element; none if one cannot be.
+    pub(super) groups: HashMap<usize, Option<Group<'d>>>,
+}
+
+/// A group that has been shown.
+#[derive(Clone, Debug)]
+pub(super) struct Group<'d> {
+    /// What its instances share.
+    pub(super) shared: ObjectId,
+    /// The shapes that shine, which they do not share.
+    pub(super) shining: Vec<&'d Element>,
+}
+
+impl Filling<'_> {
+    pub(super) fn new(builder: SceneBuilder) -> Self {
+        let (materials, meshes, balls, groups) = Default::default();
+        Self { builder, materials, meshes, made: 0, balls, in_group: false, groups }
+    }
+}
+
+// Groups of shapes, and their instances.
+
+/// Most triangles that are made: of round shapes, and of lamps in instances. A short file can ask for any number.
+const MAX_MADE: u64 = 1 << 23;
+
+impl<'d> Context<'d> {
+    /// Shows the shapes of a group, moved.
+    pub(super) fn instance(&self, element: &'d Element, filling: &mut Filling<'d>) -> Result<(), LoadError> {
+        let groups = self.parts(element, "shape")?;
+        let [group] = groups.as_slice() else {
+            return Err(self.bad(element, "an instance needs one <shape type=\"shapegroup\">, by reference"));
+        };
+        if group.kind() != "shapegroup" {
+            return Err(self.bad(element, format!("an instance of {}; expected a shapegroup", group.label())));
+        }
+        let to_world = self.transform(element, "to_world")?;
+        if !filling.groups.contains_key(&group.serial) {
+            // What is wrong with a group is said once
+            filling.groups.insert(group.serial, None);
+            let made = self.group(group, filling)?;
+            filling.groups.insert(group.serial, Some(made));
+        }
+        let Some(Some(Group { shared, shining })) = filling.groups.get(&group.serial).cloned() else {
+            return Ok(());
+        };
+        match filling.builder.instance(shared, rows(to_world)) {
+            Err(SceneError::Singular) => {
+                self.ignored(element, "an instance is left out: its transform is singular");
+                return Ok(());
+            }
+            shown => shown.map_err(self.refused(element))?,
+        }
+        shining.iter().try_for_each(|shape| self.simple(shape, Some(to_world), filling))
+    }
+
+    /// Adds the shapes of a group that its instances share.
+    fn group(&self, group: &'d Element, filling: &mut Filling<'d>) -> Result<Group<'d>, LoadError> {
+        let (mut shining, mut plain) = (vec![], vec![]);
+        for shape in self.merged(group)? {
+            if matches!(shape.kind(), "shapegroup" | "instance") {
+                return Err(self.unsupported(shape, "an instance in a group"));
+            }
+            let lamp = !self.parts(shape, "emitter")?.is_empty();
+            if lamp { &mut shining } else { &mut plain }.push(shape);
+        }
+        filling.builder.begin_object().map_err(self.refused(group))?;
+        filling.in_group = true;
+        let added = plain.into_iter().try_for_each(|shape| self.simple(shape, None, filling));
+        filling.in_group = false;
+        let shared = filling.builder.end_object().map_err(self.refused(group))?;
+        added.map(|()| Group { shared, shining })
+    }
+
+    /// The shapes in an element; of those that are a `merge`, the shapes in them.
+    pub(super) fn merged(&self, element: &'d Element) -> Result<Vec<&'d Element>, LoadError> {
+        let mut all = Vec::new();
+        for shape in self.parts(element, "shape")? {
+            match shape.kind() {
+                "merge" => all.extend(self.nested_in(shape, || self.merged(shape))?),
+                _ => all.push(shape),
+            }
+            self.spend(element, all.len())?;
+        }
+        Ok(all)
+    }
+
+    /// Counts triangles that are made, and refuses more than [`MAX_MADE`].
+    pub(super) fn count_made(
+        &self,
+        element: &Element,
+        count: usize,
+        filling: &mut Filling<'d>,
+    ) -> Result<(), LoadError> {
+        filling.made = filling.made.saturating_add(count as u64);
+        self.place(element).at_most("triangles made of shapes so far", filling.made, MAX_MADE)
+    }
+}
+
+// Attributes of meshes, which are colours at their corners or on their faces.
+
+/// An attribute that a surface takes its colour from.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Attribute {
+    /// With `vertex_` or `face_` in front.
+    pub(super) name: String,
+    /// Factor on it.
+    scale: f64,
+}
+
+impl<'d> Context<'d> {
+    /// The attribute that the surfaces in an element use, if they use one.
+    ///
+    /// # Errors
+    /// [`LoadError`] if they use several.
+    pub(super) fn attribute_of(&self, element: &'d Element) -> Result<Option<Attribute>, LoadError> {
+        if let Some(known) = self.attributes.borrow().get(&element.serial) {
+            return Ok(known.clone());
+        }
+        self.spend(element, element.children.len())?;
+        let mut found = None;
+        for child in &element.children {
+            let part = self.resolve(child)?;
+            let attribute = match part.tag.as_str() {
+                "texture" if part.kind() == "mesh_attribute" => {
+                    let name = self.string(part, "name")?;
+                    let name =
+                        name.ok_or_else(|| self.bad(part, "a mesh attribute needs a `name`"))?.to_owned();
+                    Some(Attribute { name, scale: self.float(part, "scale")?.unwrap_or(1.0) })
+                }
+                "bsdf" | "texture" => self.nested_in(part, || self.attribute_of(part))?,
+                _ => None,
+            };
+            if found.is_some() && attribute.is_some() && found != attribute {
+                return Err(self.unsupported(part, "a second attribute of one mesh"));
+            }
+            found = found.or(attribute);
+        }
+        self.attributes.borrow_mut().insert(element.serial, found.clone());
+        Ok(found)
+    }
+
+    /// A PLY mesh with the colours of an attribute, brought into 0…1.
+    pub(super) fn coloured(
+        &self,
+        shape: &Element,
+        bytes: &[u8],
+        path: &Path,
+        attribute: &Attribute,
+    ) -> Result<Triangles, LoadError> {
+        let mut mesh = ply::parse_with(bytes, path, Some(&attribute.name))?;
+        let mut outside = 0;
+        for value in mesh.colours.iter_mut().chain(&mut mesh.face_colours).flatten() {
+            *value *= attribute.scale as f32;
+            if !(0.0..=1.0).contains(value) {
+                outside += 1;
+                *value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
+            }
+        }
+        if outside > 0 {
+            let what = format!("{outside} values of `{}` are outside 0…1 and are clamped", attribute.name);
+            self.approximated(shape, what);
+        }
+        Ok(mesh)
+    }
 }

@@ -1,13 +1,14 @@
 //! Textures.
 
 use super::context::Context;
-use super::raster::{Raster, linear};
 use super::xml::Element;
 use crate::channels;
+pub(super) use crate::channels::linear;
 use crate::colour::Quantity;
 use crate::error::LoadError;
 use crate::picture::{self, Picture, Samples};
-use noisefloor::{Rgb, display::srgb_decode};
+use noisefloor::Rgb;
+use noisefloor::display::srgb_decode;
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
 use std::sync::Arc;
 
@@ -324,5 +325,22 @@ pub(super) fn peak(texture: &Texture) -> f32 {
         }
         // This reader makes no others
         _ => 1.0,
+    }
+}
+
+// A picture, ready to become textures.
+
+/// A picture, ready for textures.
+#[derive(Clone, Debug)]
+pub(super) struct Raster {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) pixels: Pixels,
+}
+
+impl Raster {
+    /// Width, height, and linear values.
+    pub(super) fn linear(&self) -> (usize, usize, Vec<Rgb>) {
+        (self.width, self.height, linear(&self.pixels))
     }
 }

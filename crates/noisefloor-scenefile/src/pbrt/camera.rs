@@ -137,7 +137,7 @@ impl View {
         (part(x, self.size.0), part(y, self.size.1))
     }
 
-    pub(super) fn look(&self) -> Camera {
+    pub(super) fn to_camera(&self) -> Camera {
         let axes = DMat3::from_mat4(self.to_world);
         let (eye, view) = (self.to_world.w_axis.truncate(), axes.z_axis.normalize_or_zero());
         // Far from 0, a target close by would be rounded

@@ -197,7 +197,7 @@ impl<'a> Reader<'a> {
         let refused = Self::refused(&whole);
         builder.optics(view.optics()).map_err(&refused)?;
         let scene = builder.build().map_err(&refused)?;
-        let scene = scene.with_camera(view.look()).map_err(&refused)?.with_identity(folder.contents());
+        let scene = scene.with_camera(view.to_camera()).map_err(&refused)?.with_identity(folder.contents());
         // One more segment than bounces
         Ok(Loaded { scene, size: Some(view.size()), max_depth, clamp: view.clamp, warnings })
     }

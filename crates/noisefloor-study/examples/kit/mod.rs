@@ -1,4 +1,5 @@
 //! Studies of simulated observers, without a server.
+#![allow(clippy::mod_module_files, reason = "a file of examples/ would be an example")]
 
 use noisefloor_image::write_png;
 use noisefloor_study::analysis::{AnalysisOptions, Observer, StudyReport, report};

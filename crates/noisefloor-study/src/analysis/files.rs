@@ -1,7 +1,7 @@
 //! An analysis as files: tables, a corpus for `train`, plots, and the grid over the picture.
 
-use super::classes::ClassRow;
 use super::plots;
+use super::report::ClassRow;
 use super::report::StudyReport;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::config::Study;

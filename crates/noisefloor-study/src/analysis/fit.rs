@@ -6,7 +6,7 @@
 //! simulated in `examples/coverage.rs`.
 
 use super::shapes::{SHAPES, Shape};
-use crate::questplus::Posterior;
+use noisefloor_pages::questplus::Posterior;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Shares of stops that may be slips, anywhere in the stack (Wichmann and Hill 2001, "The psychometric

@@ -50,7 +50,7 @@ pub fn bootstrap<const N: usize>(
     if observers < 2 {
         return None;
     }
-    let mut random = crate::random::seeded(seed);
+    let mut random = noisefloor_pages::random::seeded(seed);
     let mut weights = vec![0.0; observers];
     let draw = |_| {
         weights.fill(0.0);
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn the_bootstrap_covers_a_mean_as_often_as_it_says() {
         let covered = (0..400).filter(|&seed| {
-            let mut random = crate::random::seeded(seed);
+            let mut random = noisefloor_pages::random::seeded(seed);
             let values: Vec<f64> =
                 (0..20).map(|_| (0..12).map(|_| random.f64()).sum::<f64>() - 6.0).collect();
             let mean = |w: &[f64]| Some([values.iter().zip(w).map(|(v, w)| v * w).sum::<f64>() / 20.0]);

@@ -3,10 +3,10 @@
 use super::fit::Observation;
 use crate::config::Study;
 use crate::error::StudyError;
-use crate::questplus::Posterior;
 use crate::session::{CatchKind, Class, Haste, Stage, TrialOutcome, grids, replay};
 use crate::store::SessionRecord;
-use crate::viewing::{Conditions, ViewingProblem};
+use noisefloor_pages::questplus::Posterior;
+use noisefloor_pages::viewing::{Conditions, ViewingProblem};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -84,7 +84,7 @@ impl Observer {
     }
 
     /// Whether the observer answered anything that counts.
-    pub fn has_answers(&self) -> bool {
+    pub(crate) fn has_answers(&self) -> bool {
         self.clicks > 0 || !self.stops.is_empty() || self.stage == Stage::ScreenedOut
     }
 

@@ -1,6 +1,6 @@
 //! Plots of an analysis.
 
-use super::classes::ClassRow;
+use super::report::ClassRow;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::error::StudyError;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD};

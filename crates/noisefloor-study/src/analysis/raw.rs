@@ -4,15 +4,15 @@
 //! Participants are numbered in the order they began. Their codes, with which answers can be erased, and the
 //! identifiers from their addresses are left out.
 
-use super::listing::ObserverRow;
+use super::report::ObserverRow;
 use super::report::StudyReport;
 use crate::config::Study;
 use crate::error::{StoreError, StudyError};
 use crate::event::{Choice, StudyEvent};
 use crate::session::{CatchKind, Trial, TrialRole, begin, grids};
 use crate::store::SessionRecord;
-use crate::viewing::Conditions;
 use noisefloor_image::write_atomic;
+use noisefloor_pages::viewing::Conditions;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::fs::create_dir_all;

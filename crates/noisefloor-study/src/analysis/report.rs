@@ -1,14 +1,16 @@
 //! The results of an analysis.
 
 use super::agreement::{self, BetweenObservers, RepeatAgreement};
-use super::classes::{self, ClassRow};
-use super::groups::{self, GroupLine};
-use super::listing::{self, ObserverRow};
-use super::observers::{self, Observer};
+use super::interval::{Share, bootstrap};
+use super::observers::{self, Observer, places};
+use super::screening;
 use super::tiles::{self, TileRow};
 use crate::config::{Study, StudyProtocol};
 use crate::error::StudyError;
+use crate::session::{Class, Stage};
 use crate::store::read_all;
+use noisefloor::Audience;
+use noisefloor_learn::AudienceFit;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -64,7 +66,7 @@ pub fn analyse(study: &Arc<Study>, options: AnalysisOptions) -> Result<StudyRepo
 
 /// Analyses observers already in memory.
 pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -> StudyReport {
-    let rows = listing::rows(study, observers);
+    let rows = observer_rows(study, observers);
     let counts = |row: &ObserverRow| options.keep_excluded || row.excluded.is_none();
     let kept: Vec<&Observer> =
         observers.iter().zip(&rows).filter(|(_, row)| counts(row)).map(|(o, _)| o).collect();
@@ -76,8 +78,173 @@ pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -
         tiles: if thresholds { tiles::rows(study, &kept, options.seed) } else { Vec::new() },
         repeats: agreement::repeats(study, &kept),
         between: agreement::between(study, &kept),
-        groups: if thresholds { groups::lines(study, &kept) } else { Vec::new() },
-        classes: classes::rows(&kept, options.seed),
+        groups: if thresholds { group_lines(study, &kept) } else { Vec::new() },
+        classes: class_rows(&kept, options.seed),
         observers: rows,
+    }
+}
+
+// Validation: how often pairs of each class are called identical (Takouachet et al. 2017, Table 2).
+
+/// One column of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct ClassRow {
+    /// What was shown.
+    pub class: Class,
+    /// Answers "identical".
+    #[serde(flatten)]
+    pub identical: Share,
+    /// 95 % interval over observers: wider than Wilson's where answers of one observer are alike.
+    pub observers_interval: Option<[f64; 2]>,
+}
+
+/// The table; empty without answers.
+fn class_rows(observers: &[&Observer], seed: u64) -> Vec<ClassRow> {
+    let row = |class: Class| {
+        let count = |o: &&Observer| {
+            let of = o.judged.iter().filter(|(_, c, _)| *c == class);
+            let identical = of.clone().filter(|(.., identical)| *identical);
+            (identical.count(), of.count())
+        };
+        let counts: Vec<(usize, usize)> = observers.iter().map(count).collect();
+        let (yes, of) = counts.iter().fold((0, 0), |(yes, of), c| (yes + c.0, of + c.1));
+        let share = |weights: &[f64]| {
+            let sum = |f: &dyn Fn(&(usize, usize)) -> usize| -> f64 {
+                counts.iter().zip(weights).map(|(c, w)| f(c) as f64 * w).sum()
+            };
+            Some([sum(&|c| c.0) / sum(&|c| c.1)])
+        };
+        let identical = Share::new(yes, of)?;
+        let observers_interval = bootstrap(counts.len(), seed, [identical.share], share).map(|[i]| i);
+        Some(ClassRow { class, identical, observers_interval })
+    };
+    [Class::Reference, Class::Test, Class::Noisy].into_iter().filter_map(row).collect()
+}
+
+// Groups of observers against each other, as in Takouachet et al. 2017, §7.3.
+
+/// The line from the thresholds of the first group to those of another.
+#[derive(Clone, Debug, Serialize)]
+pub struct GroupLine {
+    /// The group that T stands for.
+    pub from: String,
+    /// The group that T′ stands for.
+    pub to: String,
+    /// Observers of each.
+    pub observers: [usize; 2],
+    /// Tiles that both gave thresholds for.
+    pub tiles: usize,
+    /// Simple regression by least squares, as in the paper; `None` if all T are the same.
+    pub least_squares: Option<Audience>,
+    /// Robust line with intervals and r: the one to pass to `render --audience`. `None` if it cannot be
+    /// fitted.
+    pub robust: Option<AudienceFit>,
+    /// Why there is no robust line.
+    pub problem: Option<String>,
+}
+
+/// Lines from the first group of the study to every other group with observers.
+fn group_lines(study: &Study, observers: &[&Observer]) -> Vec<GroupLine> {
+    let members =
+        |group: &str| -> Vec<&Observer> { observers.iter().copied().filter(|o| o.group == group).collect() };
+    let Some((first, others)) = study.groups.split_first() else { return Vec::new() };
+    let base = members(first);
+    let line = |group: &String| {
+        let group_observers = members(group);
+        if base.is_empty() || group_observers.is_empty() {
+            return None;
+        }
+        let pairs: Vec<(f64, f64)> = places(study)
+            .into_iter()
+            .filter_map(|p| Some((mean(study, &base, p)?, mean(study, &group_observers, p)?)))
+            .collect();
+        let robust = AudienceFit::new(&pairs);
+        Some(GroupLine {
+            from: first.clone(),
+            to: group.clone(),
+            observers: [base.len(), group_observers.len()],
+            tiles: pairs.len(),
+            least_squares: least_squares(&pairs),
+            problem: robust.as_ref().err().map(ToString::to_string),
+            robust: robust.ok(),
+        })
+    };
+    others.iter().filter_map(line).collect()
+}
+
+fn mean(study: &Study, observers: &[&Observer], place: (u32, u32)) -> Option<f64> {
+    let all: Vec<f64> = observers.iter().filter_map(|o| o.threshold(study, place)).collect();
+    (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+}
+
+fn least_squares(pairs: &[(f64, f64)]) -> Option<Audience> {
+    let n = pairs.len() as f64;
+    let (x, y) = (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
+    let xy: f64 = pairs.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    let xx: f64 = pairs.iter().map(|p| (p.0 - x).powi(2)).sum();
+    let slope = xy / xx;
+    slope.is_finite().then_some(Audience { slope, offset: y - slope * x })
+}
+
+// The table of observers, with the reasons of those who are excluded.
+
+/// One row per observer.
+#[derive(Clone, Debug, Serialize)]
+pub struct ObserverRow {
+    /// The participant's code.
+    pub code: String,
+    /// Group.
+    pub group: String,
+    /// Whether all trials were answered.
+    pub finished: bool,
+    /// Clicks and answers that count.
+    pub clicks: u64,
+    /// Tiles with a threshold.
+    pub tiles: usize,
+    /// Catch trials answered.
+    pub catch_trials: usize,
+    /// Catch trials failed.
+    pub catch_errors: usize,
+    /// Ratio of this observer's thresholds to the median of the others' (median over tiles).
+    pub sensitivity: Option<f64>,
+    /// Pixels per degree of visual angle.
+    pub pixels_per_degree: Option<f64>,
+    /// Gamma of the screen, as matched by the observer.
+    pub gamma: Option<f64>,
+    /// Why the rules of the study exclude this observer, if they do.
+    pub excluded: Option<String>,
+}
+
+/// One row per observer.
+fn observer_rows(study: &Study, observers: &[Observer]) -> Vec<ObserverRow> {
+    let all: Vec<&Observer> = observers.iter().collect();
+    let sensitivities = screening::sensitivities(&all, study);
+    let exclusions = screening::exclusions(observers, study);
+    let row = |((o, sensitivity), reasons): ((&Observer, Option<f64>), Vec<String>)| ObserverRow {
+        code: o.code.clone(),
+        group: o.group.clone(),
+        finished: o.stage == Stage::Finished,
+        clicks: o.clicks,
+        tiles: o.stops.len().max(o.measured.len()),
+        catch_trials: o.caught.len(),
+        catch_errors: o.caught.iter().filter(|(_, passed)| !passed).count(),
+        sensitivity,
+        pixels_per_degree: o.conditions.map(|c| c.pixels_per_degree()),
+        gamma: o.conditions.map(|c| c.gamma),
+        excluded: (!reasons.is_empty()).then(|| reasons.join("; ")),
+    };
+    observers.iter().zip(sensitivities).zip(exclusions).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exact_line_is_found() {
+        let pairs: Vec<(f64, f64)> = (1..6).map(|i| (f64::from(i), 2.0 * f64::from(i) - 3.0)).collect();
+        let line = least_squares(&pairs).unwrap();
+        assert!((line.slope - 2.0).abs() < 1e-12 && (line.offset + 3.0).abs() < 1e-12);
+        assert_eq!(least_squares(&[(1.0, 2.0), (1.0, 3.0)]), None);
     }
 }

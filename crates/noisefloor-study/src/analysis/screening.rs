@@ -4,7 +4,7 @@ use super::observers::{Observer, places};
 use super::summary::median;
 use crate::config::{Study, StudyProtocol};
 use crate::session::{Class, Haste, Stage};
-use crate::viewing::ViewingProblem;
+use noisefloor_pages::viewing::ViewingProblem;
 use std::collections::BTreeSet;
 
 /// Fewest observers among whom BT.500 looks for one unlike the others.
@@ -54,9 +54,9 @@ pub fn individual(observer: &Observer, study: &Study) -> Vec<String> {
 /// Why the answers of a validation do not depend on the stimulus.
 fn blind(observer: &Observer) -> Option<String> {
     let share = |class: Class| {
-        let of = || observer.judged.iter().filter(|(_, c, _)| *c == class);
-        let identical = of().filter(|(.., identical)| *identical).count();
-        (of().count() > 0).then(|| identical as f64 / of().count() as f64)
+        let judged = || observer.judged.iter().filter(|(_, c, _)| *c == class);
+        let identical = judged().filter(|(.., identical)| *identical).count();
+        (judged().count() > 0).then(|| identical as f64 / judged().count() as f64)
     };
     let (reference, noisy) = (share(Class::Reference)?, share(Class::Noisy)?);
     (noisy >= reference).then(|| {
@@ -67,7 +67,7 @@ fn blind(observer: &Observer) -> Option<String> {
 
 /// Why each observer is excluded; empty for those who count. Rules that compare observers look only at those
 /// who break none by themselves: a few who click at random must not hide each other.
-pub fn exclusions(observers: &[Observer], study: &Study) -> Vec<Vec<String>> {
+pub(crate) fn exclusions(observers: &[Observer], study: &Study) -> Vec<Vec<String>> {
     let mut reasons: Vec<Vec<String>> = observers.iter().map(|o| individual(o, study)).collect();
     let mut seen = BTreeSet::new();
     for (observer, reasons) in observers.iter().zip(&mut reasons) {

@@ -169,7 +169,7 @@ impl Disagreements {
     ///
     /// # Errors
     /// [`StoreError::Database`].
-    pub fn name_scene(&self, pictures: &[String], scene: &str) -> Result<(), StoreError> {
+    pub(crate) fn name_scene(&self, pictures: &[String], scene: &str) -> Result<(), StoreError> {
         let connection = self.connection();
         let failed = |source| self.failed(source);
         let transaction = connection.unchecked_transaction().map_err(failed)?;
@@ -184,7 +184,7 @@ impl Disagreements {
     ///
     /// # Errors
     /// [`StoreError::Database`].
-    pub fn take_back(&self, id: i64) -> Result<bool, StoreError> {
+    pub(crate) fn take_back(&self, id: i64) -> Result<bool, StoreError> {
         let deleted = self.connection().execute("DELETE FROM disagreements WHERE id = ?1", [id]);
         deleted.map(|n| n > 0).map_err(|source| self.failed(source))
     }

@@ -6,7 +6,6 @@ use super::gallery::{GalleryError, GalleryPicture, PictureView};
 use super::images;
 use super::verdicts::Tiles;
 use crate::error::{StoreError, StudyError};
-use crate::http::{Refusal, read_bytes, read_json};
 use axum::Json;
 use axum::body::Body;
 use axum::extract::rejection::PathRejection;
@@ -19,6 +18,7 @@ use noisefloor::{
     evidence::{Evidence, Samples},
     stills::StillError,
 };
+use noisefloor_pages::http::{Refusal, read_bytes, read_json};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Duration;
@@ -43,10 +43,7 @@ impl From<GalleryError> for Refusal {
         let do_ = match &error {
             GalleryError::Gone => "load the page again",
             GalleryError::NoSamples(_) => "type the number beside its name",
-            GalleryError::Still(StillError::Nothing) => {
-                "drop another rendering of the same view beside it, or start with --model and a model trained with \
-                 `--evidence alone`"
-            }
+            GalleryError::Still(StillError::Nothing) => "drop another rendering of the same view beside it",
             GalleryError::Still(StillError::Undecided { .. } | StillError::Dependent { .. }) => {
                 "choose it under `Scene, relation, tiles`"
             }

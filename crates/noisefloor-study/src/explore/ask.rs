@@ -8,7 +8,6 @@ use super::job::{self, Job};
 use super::learn::LearnStep;
 use super::line::fit_line;
 use super::verdicts::{Answered, Judge, Question};
-use crate::http::{Refusal, read_json};
 use axum::Json;
 use axum::body::Body;
 use axum::extract::{Path, State};
@@ -16,6 +15,7 @@ use axum::http::StatusCode;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 use noisefloor::{Model, People};
+use noisefloor_pages::http::{Refusal, read_json};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 

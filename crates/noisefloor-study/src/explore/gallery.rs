@@ -14,9 +14,9 @@ use std::sync::Arc;
 use thiserror::Error;
 
 /// Most pictures at once.
-pub const MAX_PICTURES: usize = 64;
+pub(crate) const MAX_PICTURES: usize = 64;
 /// Most pixels of all pictures together; each takes 12 bytes.
-pub const MAX_GALLERY_PIXELS: usize = 48 << 20;
+pub(crate) const MAX_GALLERY_PIXELS: usize = 48 << 20;
 /// Most tiles of a picture.
 const MAX_TILES: usize = 1024;
 

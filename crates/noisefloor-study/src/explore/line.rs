@@ -179,7 +179,7 @@ mod tests {
         let (model, people) = (Model::bundled(), People::DEFAULT);
         let mut errors = Vec::new();
         for seed in 0..200 {
-            let mut random = crate::random::seeded(seed);
+            let mut random = noisefloor_pages::random::seeded(seed);
             let factor = 0.5 * 6f64.powf(random.f64());
             let scale = (0.15 + 0.35 * random.f64()) * 3f64.sqrt() / std::f64::consts::PI;
             let slips = 0.05 * random.f64();

@@ -1,23 +1,23 @@
 //! The page, embedded in the program.
 
-use crate::http::{HTML, PageFile, Refusal, SCRIPT, STYLE, page_file};
-use crate::languages::parse_language;
 use axum::Json;
 use axum::extract::Path;
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use noisefloor_pages::http::{ASK, HTML, LOOK, PageFile, Refusal, SCRIPT, STYLE, page_file};
+use noisefloor_pages::languages::parse_language;
 
 const PAGE: &str = include_str!("../../pages/explore/index.html");
 const FILES: [PageFile; 9] = [
-    ("ask.js", SCRIPT, include_str!("../../pages/ask.js")),
+    ASK,
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
     ("learn.js", SCRIPT, include_str!("../../pages/explore/learn.js")),
     ("line.js", SCRIPT, include_str!("../../pages/explore/line.js")),
     ("parts.js", SCRIPT, include_str!("../../pages/explore/parts.js")),
     ("server.js", SCRIPT, include_str!("../../pages/explore/server.js")),
-    ("style.css", STYLE, include_str!("../../pages/style.css")),
+    LOOK,
     ("explore.css", STYLE, include_str!("../../pages/explore/explore.css")),
 ];
 

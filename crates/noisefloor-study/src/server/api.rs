@@ -5,7 +5,6 @@ use super::views::{Beginning, SessionView, StudyView};
 use crate::code;
 use crate::error::StoreError;
 use crate::event::Envelope;
-use crate::http::{Client, Refusal, read_json};
 use crate::session::Plan;
 use crate::store::NewSession;
 use axum::Json;
@@ -15,6 +14,7 @@ use axum::extract::{Extension, Path, State};
 use axum::http::StatusCode;
 use axum::http::header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
+use noisefloor_pages::http::{Client, Refusal, read_json};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

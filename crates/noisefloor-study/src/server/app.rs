@@ -2,12 +2,13 @@
 
 use super::tiles::TileCache;
 use crate::config::Study;
-use crate::error::StoreError;
+use crate::error::{StoreError, conflict};
 use crate::event::Envelope;
-use crate::http::{Guard, Refusal};
-use crate::questplus::QuestGrid;
 use crate::session::{ParticipantSession, replay};
 use crate::store::AnswerStore;
+use axum::http::StatusCode;
+use noisefloor_pages::http::{Guard, Refusal};
+use noisefloor_pages::questplus::QuestGrid;
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -99,19 +100,21 @@ impl App {
             return match there {
                 Err(error) => Err(error.into()),
                 Ok(_) if same => Ok(session.clone()),
-                Ok(_) => Err(Refusal::conflict(seq, next)),
+                Ok(_) => Err(conflict(seq, next)),
             };
         }
         if seq > now.events() {
             let next = now.events();
             *live = Some(now);
-            return Err(Refusal::conflict(seq, next));
+            return Err(conflict(seq, next));
         }
         let mut after = now.clone();
         if let Err(misfit) = after.apply(&envelope.event) {
             let next = now.events();
             *live = Some(now);
-            return Err(Refusal::misfit(&misfit, next));
+            let do_ = "load the session again, and show what it says";
+            let refusal = Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, misfit.to_string(), "event", do_);
+            return Err(refusal.with_next_seq(next));
         }
         if let Err(error) = self.store.append(code, envelope).await {
             // Whether it is on disk is unknown: the session is read again next time

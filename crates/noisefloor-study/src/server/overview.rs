@@ -3,7 +3,6 @@
 use super::app::App;
 use crate::analysis::observers::Observer;
 use crate::analysis::screening;
-use crate::http::Refusal;
 use crate::session::Stage;
 use crate::store::{SessionRecord, now_ms};
 use axum::Json;
@@ -11,6 +10,7 @@ use axum::extract::State;
 use axum::http::header::AUTHORIZATION;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
+use noisefloor_pages::http::Refusal;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;

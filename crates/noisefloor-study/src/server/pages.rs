@@ -1,9 +1,9 @@
 //! The pages, embedded in the program.
 
-use crate::http::{HTML, PageFile, SCRIPT, STYLE, page_file};
 use axum::extract::Path;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use noisefloor_pages::http::{ASK, HTML, LOOK, PICTURE, PageFile, SCRIPT, SHEET, STYLE, VIEWING, page_file};
 
 macro_rules! page {
     ($name:literal, $kind:expr) => {
@@ -14,17 +14,17 @@ macro_rules! page {
 const PAGE: &str = include_str!("../../pages/index.html");
 const FILES: [PageFile; 12] = [
     page!("app.js", SCRIPT),
-    page!("ask.js", SCRIPT),
+    ASK,
     page!("experimenter.css", STYLE),
     page!("experimenter.html", HTML),
     page!("experimenter.js", SCRIPT),
-    page!("picture.js", SCRIPT),
+    PICTURE,
     page!("server.js", SCRIPT),
-    page!("sheet.js", SCRIPT),
+    SHEET,
     page!("trials.js", SCRIPT),
-    page!("viewing.js", SCRIPT),
+    VIEWING,
     page!("welcome.js", SCRIPT),
-    page!("style.css", STYLE),
+    LOOK,
 ];
 
 /// The page of the participants.

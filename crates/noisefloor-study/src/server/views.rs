@@ -1,10 +1,10 @@
 //! What the pages are told, as JSON.
 
 use crate::config::{Question, Study, StudyProtocol, Texts};
-use crate::languages::Direction;
 use crate::session::{ParticipantSession, Stage, Trial, TrialRole};
 use crate::stack::StudyStack;
-use crate::viewing::{Conditions, ViewingProblem};
+use noisefloor_pages::languages::Direction;
+use noisefloor_pages::viewing::{Conditions, ViewingProblem};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -71,7 +71,7 @@ impl StudyView {
         let texts = |(code, text): (&String, &Texts)| {
             (code.clone(), Texts { debriefing: String::new(), ..text.clone() })
         };
-        let language = |(code, l): (&String, &crate::languages::Language)| {
+        let language = |(code, l): (&String, &noisefloor_pages::languages::Language)| {
             (code.clone(), LanguageView { name: l.name.clone(), direction: l.direction })
         };
         Self {

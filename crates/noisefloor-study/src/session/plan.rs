@@ -59,7 +59,7 @@ pub(super) enum Pair {
 impl Plan {
     /// Draws the trials of a session. The order depends on the seed of the study and this one.
     pub fn draw(study: &Study, seed: u64) -> Self {
-        let random = &mut crate::random::seeded(study.seed.rotate_left(32) ^ seed);
+        let random = &mut noisefloor_pages::random::seeded(study.seed.rotate_left(32) ^ seed);
         let (practice, mut trials) = match study.protocol {
             StudyProtocol::Acquisition => acquisition(study, random),
             StudyProtocol::Validation => validation(study, random),

@@ -5,7 +5,7 @@ use crate::event::{Choice, StudyEvent, TrialTiming};
 use crate::server::StackView;
 use crate::session::Trial;
 use crate::stack::StudyStack;
-use crate::viewing::{Ambient, Conditions};
+use noisefloor_pages::viewing::{Ambient, Conditions};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::f64::consts::PI;
 
@@ -110,7 +110,7 @@ impl Public {
 
     /// Draws an observer who behaves in this way.
     pub fn draw_as(&self, seed: u64, behaviour: Behaviour) -> SimulatedObserver {
-        let mut random = crate::random::seeded(seed);
+        let mut random = noisefloor_pages::random::seeded(seed);
         let own = self.between * self.shape.draw(&mut random);
         let ln = |tiles: &Vec<f64>| tiles.iter().map(|t| t.ln() + own).collect();
         SimulatedObserver {
@@ -127,7 +127,7 @@ impl Public {
     /// reference, over observers and showings, without bias and lapses. Found from 400 001 draws; accurate
     /// to about 0.4 % at 95 %.
     pub fn quantile(&self, stack: usize, tile: usize, share: f64) -> f64 {
-        let mut random = crate::random::seeded(0);
+        let mut random = noisefloor_pages::random::seeded(0);
         let mut draw = |_| self.between * self.shape.draw(&mut random) + logistic(&mut random, self.within);
         let mut sums: Vec<f64> = (0..400_001).map(&mut draw).collect();
         sums.sort_by(f64::total_cmp);

@@ -58,7 +58,7 @@ impl AnswerStore {
     ///
     /// # Errors
     /// [`StoreError`] if they could not be stored.
-    pub async fn keep_plans(&self, study: Arc<Study>) -> Result<(), StoreError> {
+    pub(crate) async fn keep_plans(&self, study: Arc<Study>) -> Result<(), StoreError> {
         self.ask(|reply| Command::KeepPlans { study, reply }).await
     }
 
@@ -84,7 +84,7 @@ impl AnswerStore {
     /// # Errors
     /// [`StoreError::Unknown`] if the session does not exist or was erased, [`StoreError::Conflict`] if the
     /// number is taken.
-    pub async fn append(&self, code: &str, envelope: Envelope) -> Result<(), StoreError> {
+    pub(crate) async fn append(&self, code: &str, envelope: Envelope) -> Result<(), StoreError> {
         let (code, envelope) = (code.to_owned(), Box::new(envelope));
         self.ask(|reply| Command::Append { code, envelope, reply }).await
     }

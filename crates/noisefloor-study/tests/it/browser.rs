@@ -5,11 +5,11 @@ use noisefloor_eyes::Eyes;
 use noisefloor_learn::{Corpora, describe_corpora};
 use noisefloor_learn::{TrainParams, train};
 use noisefloor_learn::{predict, score};
-use noisefloor_study::Exposure;
+use noisefloor_pages::calibrate::{CalibrateServer, CalibrateSetup};
+use noisefloor_pages::http::Exposure;
 use noisefloor_study::analysis::CorpusThreshold;
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::{AnalysisOptions, analyse};
-use noisefloor_study::calibrate::{CalibrateServer, CalibrateSetup};
 use noisefloor_study::explore::ExploreSetup;
 use noisefloor_study::simulated::{Public, SimulatedObserver, SpreadShape};
 use noisefloor_study::{StackView, Study, StudyEvent, Trial, store};
@@ -83,7 +83,7 @@ option = [
 
 /// A language written from right to left: the English texts, with those that the test reads in Arabic.
 fn arabic() -> String {
-    let mut text = include_str!("../../pages/languages/en.toml").to_owned();
+    let mut text = include_str!("../../../noisefloor-pages/pages/languages/en.toml").to_owned();
     for (english, arabic) in [
         ("name = \"English\"", "name = \"العربية\""),
         ("direction = \"ltr\"", "direction = \"rtl\""),

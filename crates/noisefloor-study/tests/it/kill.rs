@@ -1,7 +1,8 @@
 use crate::kit::{Folder, levels, public};
+use noisefloor_pages::http::Exposure;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::simulated::drive;
-use noisefloor_study::{Exposure, Study, StudyServer, store};
+use noisefloor_study::{Study, StudyServer, store};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::sync::Arc;

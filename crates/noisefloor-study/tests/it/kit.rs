@@ -1,7 +1,8 @@
 use noisefloor_image::write_png;
+use noisefloor_pages::http::Exposure;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::simulated::{Public, SpreadShape};
-use noisefloor_study::{Exposure, Study, StudyServer};
+use noisefloor_study::{Study, StudyServer};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};

@@ -1,6 +1,6 @@
 use crate::browser;
 use crate::kit::Running;
-use noisefloor_study::Exposure;
+use noisefloor_pages::http::Exposure;
 use std::fs;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,9 @@
 use crate::kit::{Folder, levels, public};
+use noisefloor_pages::viewing::{Conditions, ViewingProblem};
 use noisefloor_study::simulated::{Behaviour, run};
 use noisefloor_study::{
-    CatchKind, Choice, Conditions, Haste, ParticipantSession, Plan, Stage, StudyEvent, Trial, TrialOutcome,
-    TrialRole, TrialTiming, ViewingProblem, grids,
+    CatchKind, Choice, Haste, ParticipantSession, Plan, Stage, StudyEvent, Trial, TrialOutcome, TrialRole,
+    TrialTiming, grids,
 };
 use std::collections::BTreeMap;
 

@@ -1,8 +1,7 @@
 //! What a descriptor is, and how one is named in files.
 
-use crate::descriptor::NoiseMask;
 use crate::evidence::TilePlanes;
-use crate::tile::{MAX_TILE, Tile};
+use crate::tile::Tile;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -123,7 +122,7 @@ pub struct DescriptorKind {
 #[derive(Clone, Debug)]
 pub struct Descriptor(Arc<dyn TileDescriptor>);
 
-/// A descriptor as files name it: `{"mask-pair": {"edge": 128, "mask": 1.0}}` in JSON.
+/// A descriptor as files name it: `{"visible": {"window": 0.75, …}}` in JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Named", into = "Named")]
 pub struct DescriptorSpec {
@@ -231,17 +230,4 @@ impl From<DescriptorSpec> for Named {
     fn from(spec: DescriptorSpec) -> Self {
         Self::from([(spec.name, spec.parameters)])
     }
-}
-
-/// The parameter `mask`: σ of the noise mask.
-pub(super) fn mask(parameters: &BTreeMap<String, f64>) -> Result<NoiseMask, String> {
-    let sigma = parameters.get("mask").ok_or("its mask is missing")?;
-    NoiseMask::try_from(*sigma as f32).map_err(|e| e.to_string())
-}
-
-/// The parameter `edge`: of the tiles in pixels.
-pub(super) fn edge(parameters: &BTreeMap<String, f64>) -> Result<usize, String> {
-    let edge = *parameters.get("edge").ok_or("its edge is missing")?;
-    let whole = edge.fract() == 0.0 && (1.0..=MAX_TILE as f64).contains(&edge);
-    if whole { Ok(edge as usize) } else { Err(format!("an edge of {edge} pixels is out of range")) }
 }

@@ -20,12 +20,12 @@ const FLOOR: f32 = 4.0;
 const STEP: f32 = 1.0 / 255.0;
 
 /// Mask energies of the noise and of the picture on the grid of 8×8-pixel blocks, row-major, in squared 8-bit steps;
-/// and room for what they are made from. Each thread keeps its own, so that a verdict allocates nothing.
+/// and buffers for what they are made from. Each thread keeps its own, so that a verdict allocates nothing.
 #[derive(Default)]
 struct Blocks {
     noise: [Vec<f32>; SCALES],
     picture: [Vec<f32>; SCALES],
-    room: Room,
+    buffers: Buffers,
 }
 
 thread_local! {
@@ -35,11 +35,11 @@ thread_local! {
 /// Half the logarithm of the texture energy of a tile: of what the masks of its picture have more than noise, summed
 /// over scales, as a mean over its blocks.
 pub(super) fn texture_energy(planes: &TilePlanes, mask: NoiseMask) -> f32 {
-    BLOCKS.with_borrow_mut(|Blocks { noise, picture, room }| {
+    BLOCKS.with_borrow_mut(|Blocks { noise, picture, buffers }| {
         let (width, residual) = level(&planes.residual);
         let (_, image) = level(&planes.image);
-        energies(width, residual, mask, planes.rounding * ROUNDING_LUMINANCE, noise, room);
-        energies(width, image, mask, 0.0, picture, room);
+        energies(width, residual, mask, planes.rounding * ROUNDING_LUMINANCE, noise, buffers);
+        energies(width, image, mask, 0.0, picture, buffers);
         let count = noise[0].len();
         let texture: f32 = (0..count)
             .map(|at| {
@@ -51,9 +51,9 @@ pub(super) fn texture_energy(planes: &TilePlanes, mask: NoiseMask) -> f32 {
     })
 }
 
-/// Room for the rows and levels on the way to energies on blocks.
+/// Buffers for the rows and levels on the way to energies on blocks.
 #[derive(Default)]
-struct Room {
+struct Buffers {
     levels: [Vec<f32>; SCALES - 1],
     column: Vec<f32>,
     row: Vec<f32>,
@@ -75,9 +75,9 @@ fn energies(
     mask: NoiseMask,
     rounding: f32,
     out: &mut [Vec<f32>; SCALES],
-    room: &mut Room,
+    buffers: &mut Buffers,
 ) {
-    let Room { levels, column, row, sums, rough } = room;
+    let Buffers { levels, column, row, sums, rough } = buffers;
     let [half, quarter, eighth] = levels;
     halve(width, plane, half);
     halve(width / 2, half, quarter);

@@ -186,7 +186,7 @@ fn a_descriptor_that_is_not_here_is_refused() {
     assert!(matches!(read(|f| f.descriptor_version = 99), ModelError::Descriptor { needed: 99, .. }));
     let unknown = read(|f| f.descriptor.name = "tea-leaves".into());
     assert!(
-        unknown.to_string().contains("tea-leaves") && unknown.to_string().contains("mask-pair"),
+        unknown.to_string().contains("tea-leaves") && unknown.to_string().contains("visible"),
         "{unknown}"
     );
     let empty = read(|f| f.descriptor.parameters.clear());

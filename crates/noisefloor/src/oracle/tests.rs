@@ -1,14 +1,15 @@
 use super::*;
-use crate::descriptor::Descriptor;
-use crate::descriptor::NoiseMask;
+use crate::descriptor::{Descriptor, TileDescriptor};
 use crate::display::Display;
 use crate::film::Film;
 use crate::model::tests::{changed, small};
 use crate::params::Audience;
 use crate::rgb::Rgb;
 use crate::svm::{Machine, Scaler, Svm};
+use ndarray::s;
 use noisefloor_testkit::Noise;
 use noisefloor_vision::Viewing;
+use std::collections::BTreeMap;
 
 /// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
 fn film(samples: u64, sigma: f32) -> Film {
@@ -241,11 +242,42 @@ fn tiles_are_judged_in_their_picture_whoever_is_asked_about() {
     });
 }
 
+/// The residuals of a tile of one size: they tell neither noise from picture nor one display from another.
+#[derive(Debug)]
+struct Residuals {
+    edge: usize,
+}
+
+impl TileDescriptor for Residuals {
+    fn name(&self) -> &'static str {
+        "residuals"
+    }
+
+    fn version(&self) -> u16 {
+        1
+    }
+
+    fn parameters(&self) -> BTreeMap<String, f64> {
+        BTreeMap::new()
+    }
+
+    fn number_names(&self) -> Vec<String> {
+        (0..self.edge * self.edge).map(|i| i.to_string()).collect()
+    }
+
+    fn describe(&self, planes: &TilePlanes) -> Result<Vec<f32>, DescriptorError> {
+        let (Tile { x, y, width, height, .. }, expected) = (planes.inner, self.edge);
+        if (width, height) != (expected, expected) {
+            return Err(DescriptorError::TileSize { expected, width, height });
+        }
+        Ok(planes.residual.slice(s![y..y + height, x..x + width]).iter().copied().collect())
+    }
+}
+
 #[test]
-fn the_paper_s_descriptor_judges_tiles_of_its_size_only() {
-    let descriptor = Descriptor::mask_pair(NoiseMask::default(), 64);
+fn a_descriptor_of_one_tile_size_judges_no_other() {
+    let descriptor = Descriptor::new(Residuals { edge: 64 });
     let n = descriptor.dimensions();
-    assert_eq!(n, 2 * 64 * 64);
     let svm = Svm { gamma: 2.0, rho: 0.5, coefficients: vec![1.0], vectors: vec![0.0; n] };
     let model = changed(small(), |m| {
         m.descriptor = descriptor;
@@ -254,10 +286,10 @@ fn the_paper_s_descriptor_judges_tiles_of_its_size_only() {
     });
     let model = model.unwrap();
     let mut oracle = Oracle::new(model, People::DEFAULT);
-    // No noise, no mask: the support vector itself, f = 1 − ρ.
+    // No noise, no residual: the support vector itself, f = 1 − ρ.
     let verdict = judge(&mut oracle, &film(100, 0.0), None).unwrap();
     assert!((verdict.probability.unwrap() - 1.0 / (1.0 + (-1f32).exp())).abs() < 1e-5);
-    assert_eq!(verdict.expected_spp, None, "masks do not tell noise from picture");
+    assert_eq!(verdict.expected_spp, None, "residuals alone do not tell noise from picture");
     assert!(!oracle.maps_visible_noise());
     let film = film(100, 0.0);
     let view = View {
@@ -282,7 +314,7 @@ fn a_descriptor_that_knows_nothing_of_displays_refuses_another_one() {
     for value in [0.2, 0.3] {
         film.add(0, 10, &[[value; 3]; 1024]).unwrap();
     }
-    let descriptor = Descriptor::mask_pair(NoiseMask::default(), 32);
+    let descriptor = Descriptor::new(Residuals { edge: 32 });
     let model = changed(small(), |m| {
         let n = descriptor.dimensions();
         m.classifier.scaler = Scaler::identity(n);

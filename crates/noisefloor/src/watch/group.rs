@@ -23,7 +23,7 @@ const MANY: u64 = 8;
 
 /// A batch at the watched pixels: the luminance of each, between that of its neighbours.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Seen {
+struct WatchedBatch {
     spp: u64,
     light: Vec<[f32; 3]>,
 }
@@ -39,13 +39,13 @@ pub(super) struct TileWatch {
     pub(super) repeated: bool,
     /// Whether values by themselves differ from batch to batch by more than rounding: they have noise.
     pub(super) varies: bool,
-    /// What was found since the last look.
+    /// What was found since the last check.
     pub(super) sums: Sums,
     /// What the values of the first group have in common.
     pub(super) values: Values,
     /// Those of the first batch, while the first group lasts.
     first: Vec<Rgb>,
-    group: Vec<Seen>,
+    group: Vec<WatchedBatch>,
 }
 
 impl TileWatch {
@@ -61,7 +61,7 @@ impl TileWatch {
             self.noisy = true;
             self.repeated |= self.group.iter().any(|seen| is_same(&seen.light, &light));
         }
-        self.group.push(Seen { spp, light });
+        self.group.push(WatchedBatch { spp, light });
     }
 
     /// Takes notice of the values of a batch of the first group.
@@ -116,7 +116,7 @@ fn is_same_value((a, b): (&f32, &f32)) -> bool {
 ///
 /// All samples count alike in m. Which of them lie in which batch is chance if they are independent, whatever
 /// m is, so that differences have the mean 0 with their weights as well.
-fn weights(batches: &[&Seen], place: usize) -> Vec<f64> {
+fn weights(batches: &[&WatchedBatch], place: usize) -> Vec<f64> {
     let all: f64 = batches.iter().map(|seen| seen.spp as f64).sum();
     let mean = |i: usize| -> f64 {
         batches.iter().map(|seen| f64::from(seen.light[i][place]) * (seen.spp as f64 / all)).sum()
@@ -127,7 +127,7 @@ fn weights(batches: &[&Seen], place: usize) -> Vec<f64> {
 }
 
 /// Two batches, one for each half.
-fn pair(a: &Seen, b: &Seen, shared: bool) -> Sums {
+fn pair(a: &WatchedBatch, b: &WatchedBatch, shared: bool) -> Sums {
     let mut sums = Sums::default();
     if a.spp != b.spp {
         return sums;
@@ -161,7 +161,7 @@ fn pair(a: &Seen, b: &Seen, shared: bool) -> Sums {
 }
 
 /// A whole group.
-fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
+fn four([a, b, c, d]: [&WatchedBatch; 4], shared: bool, sums: &mut Sums) {
     let weights = weights(&[a, b, c, d], 1);
     let combined = |of: [f64; 4]| -> Vec<f64> {
         let at = |i: usize| -> f64 {
@@ -169,7 +169,7 @@ fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
         };
         weights.iter().enumerate().map(|(i, w)| finite(at(i) * w)).collect()
     };
-    let alike = |one: &Seen, other: &Seen| {
+    let alike = |one: &WatchedBatch, other: &WatchedBatch| {
         one.spp <= other.spp.saturating_mul(ALIKE) && other.spp <= one.spp.saturating_mul(ALIKE)
     };
     let pairs = |x: Vec<f64>, y: Vec<f64>| x.into_iter().zip(y);
@@ -185,7 +185,8 @@ fn four([a, b, c, d]: [&Seen; 4], shared: bool, sums: &mut Sums) {
         sums.nested = Correlation::of(ab.iter().copied().zip(combined([1.0, 1.0, -2.0, 0.0])));
     }
     // Noise of n samples against that of m has 1/n + 1/m of the energy that one sample has
-    let size = |one: &Seen, other: &Seen| 1.0 / (1.0 / one.spp as f64 + 1.0 / other.spp as f64);
+    let size =
+        |one: &WatchedBatch, other: &WatchedBatch| 1.0 / (1.0 / one.spp as f64 + 1.0 / other.spp as f64);
     let (first, last) = (size(a, b), size(c, d));
     let energies = ab.iter().map(|ab| ab * ab).zip(cd.iter().map(|cd| cd * cd));
     if first == last && a.spp == b.spp {
@@ -218,6 +219,6 @@ fn finite(x: f64) -> f64 {
 impl TileWatch {
     /// A batch without watched pixels.
     pub(super) fn corrupt(&mut self) {
-        self.group.push(Seen { spp: 1, light: Vec::new() });
+        self.group.push(WatchedBatch { spp: 1, light: Vec::new() });
     }
 }

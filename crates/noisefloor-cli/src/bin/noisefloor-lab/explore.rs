@@ -2,8 +2,8 @@
 
 use anyhow::Context;
 use noisefloor_cli::say::say;
+use noisefloor_pages::http::{Exposure, interrupted};
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
-use noisefloor_study::{Exposure, interrupted};
 use std::net::SocketAddr;
 use tokio::runtime::Builder;
 

@@ -6,12 +6,11 @@ use noisefloor::{
     People, Viewing,
     descriptor::{Descriptor, DescriptorSpec},
     evidence::Evidence,
-    svm::SvmParams,
 };
 use noisefloor_cli::bars::bar;
 use noisefloor_learn::{
-    Chosen, Corpora, Learner, Prediction, Table, TrainParams, VISIBLE_CHOICES, choices, choose_and_leave_out,
-    describe_corpora, leave_one_scene_out, read_table, read_table_with,
+    Chosen, Corpora, Learner, Prediction, SvmParams, Table, TrainParams, VISIBLE_CHOICES, choices,
+    choose_and_leave_out, describe_corpora, leave_one_scene_out, read_table, read_table_with,
 };
 use std::collections::BTreeMap;
 use std::fs::File;

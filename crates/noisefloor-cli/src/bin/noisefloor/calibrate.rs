@@ -74,8 +74,8 @@ mod page {
     use noisefloor::Oracle;
     use noisefloor_cli::say::say;
     use noisefloor_eyes::Eyes;
-    use noisefloor_study::Exposure;
-    use noisefloor_study::calibrate::{CalibrateServer, CalibrateSetup, CalibrationStage, SimulatedEyes};
+    use noisefloor_pages::calibrate::{CalibrateServer, CalibrateSetup, CalibrationStage, SimulatedEyes};
+    use noisefloor_pages::http::Exposure;
     use std::hash::{BuildHasher, RandomState};
     use std::time::SystemTime;
 

@@ -88,7 +88,6 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
         "evidence         {}",
         match summary.evidence {
             Evidence::Halves => "the other half buffer",
-            Evidence::Alone => "none: the picture alone",
             Evidence::Reference => "a ray-traced reference",
         }
     )?;

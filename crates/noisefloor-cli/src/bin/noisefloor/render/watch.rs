@@ -6,8 +6,8 @@ use crate::output::Output;
 use noisefloor::{Rgb, Session, driver::Progress};
 use noisefloor_cli::say::{note, one_line};
 use noisefloor_image::maps::Canvas;
-use noisefloor_study::Exposure;
-use noisefloor_study::watch::{LiveRender, LiveState, LiveTile, WatchServer};
+use noisefloor_pages::http::Exposure;
+use noisefloor_pages::watch::{LiveRender, LiveState, LiveTile, WatchServer};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

@@ -1,0 +1,356 @@
+//! Who renders: the built-in path tracer, a renderer in another process, a stack of pictures, or a program.
+
+mod adapters;
+
+pub use adapters::{ADAPTERS, Adapter};
+
+use crate::build::program_digest;
+use crate::refuse;
+use crate::say::note;
+use crate::spell::{JobPath, as_typed};
+use anyhow::{Context, bail};
+use indicatif::ProgressBar;
+use noisefloor::{ProgressiveSource, Rgb, Schedule, stills::SampleOrigin};
+use noisefloor_image::StackSource;
+use noisefloor_ptwne::{
+    Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
+};
+use noisefloor_scenefile::{LoadOptions, Loaded, group_warnings};
+use serde::{Deserialize, Serialize};
+use std::ffi::OsStr;
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Where neither the command nor the scene says: a Cornell box takes half a minute.
+const DEFAULT_SCENE: &str = "cornell-box";
+const DEFAULT_SIZE: (usize, usize) = (384, 384);
+const DEFAULT_DEPTH: u32 = 65;
+/// Camera rays a pixel for albedo and normals, of each half: edges are then smoother than in the radiance
+/// of most pictures, for the time of a few samples of it.
+pub const FIRST_HITS_SPP: u64 = 32;
+
+/// Who renders what: all that samples depend on, as a value. Checked; [`SourceJob::open`] finds out the
+/// rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SourceJob {
+    pub kind: SourceKind,
+    /// A built-in scene, or a file or folder; {frame} stands for the frame of a sequence.
+    pub scene: Option<JobPath>,
+    pub seed: u64,
+    /// Of a sequence: whether all frames have that seed.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub same_seed: bool,
+    pub size: Option<(usize, usize)>,
+    pub max_depth: Option<u32>,
+    /// How the built-in renderer loads scene files.
+    pub scene_files: LoadOptions,
+}
+
+/// What a source may use; samples do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Resources {
+    pub threads: Option<NonZeroUsize>,
+    /// Of one call to another renderer.
+    pub timeout: Duration,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SourceKind {
+    Ptwne(PtwneOptions),
+    /// A folder of pictures.
+    Exr,
+    /// A template.
+    Command(String),
+    Adapter(#[serde(with = "as_typed")] &'static Adapter),
+}
+
+/// Options of the built-in renderer alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PtwneOptions {
+    pub estimator: Estimator,
+    pub sampling: Sampling,
+    pub filter: Filter,
+    pub clamp: Option<f32>,
+}
+
+impl SourceKind {
+    /// Samples per pixel between two verdicts, at the least.
+    pub fn step(&self) -> u64 {
+        match self {
+            Self::Adapter(adapter) => adapter.step,
+            Self::Ptwne(_) | Self::Exr | Self::Command(_) => Schedule::STEP,
+        }
+    }
+
+    /// As it is typed.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Ptwne(_) => "ptwne",
+            Self::Exr => "exr",
+            Self::Command(_) => "command",
+            Self::Adapter(adapter) => adapter.name,
+        }
+    }
+
+    /// Whether it renders at the size asked for; pictures have theirs.
+    pub(crate) fn takes_size(&self) -> bool {
+        !matches!(self, Self::Exr)
+    }
+
+    /// Whether it can be told the longest path.
+    pub(crate) fn takes_depth(&self) -> bool {
+        match self {
+            Self::Ptwne(_) => true,
+            Self::Exr => false,
+            Self::Command(_) => false,
+            Self::Adapter(_) => true,
+        }
+    }
+}
+
+/// What the command asks of a source beside samples.
+pub trait Source: ProgressiveSource {
+    /// What became of the samples, where the source counts it.
+    fn counts(&self) -> Option<SampleCounts> {
+        None
+    }
+
+    /// Shows how far a reference is, where it takes long, and gives it up once `cancel` is set.
+    fn watch_reference(&mut self, _bar: ProgressBar, _cancel: Arc<AtomicBool>) {}
+
+    /// What noise its reference was left with, where it has rendered one and can tell.
+    fn reference_noise(&self) -> Option<&ReferenceNoise> {
+        None
+    }
+
+    /// A whole picture of this seed as the renderer itself samples it, until its own noise threshold; `None` if it
+    /// has none.
+    fn adaptive(
+        &mut self,
+        _threshold: f64,
+        _most: Option<u64>,
+        _seed: u32,
+    ) -> anyhow::Result<Option<Vec<Rgb>>> {
+        Ok(None)
+    }
+
+    /// What the user should know after the run.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+impl Source for Ptwne {
+    fn counts(&self) -> Option<SampleCounts> {
+        Some(Ptwne::counts(self))
+    }
+
+    fn watch_reference(&mut self, bar: ProgressBar, cancel: Arc<AtomicBool>) {
+        Ptwne::watch_reference(self, move |done, all| {
+            bar.set_length(all as u64);
+            bar.set_position(done as u64);
+            if done == all {
+                bar.finish_and_clear();
+            }
+            if cancel.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+    }
+
+    fn reference_noise(&self) -> Option<&ReferenceNoise> {
+        Ptwne::reference_noise(self)
+    }
+}
+
+impl Source for StackSource {}
+
+/// A source that is ready to sample.
+pub struct Opened {
+    pub source: Box<dyn Source>,
+    /// Name of the scene, of the output folder and in reports.
+    pub scene: String,
+    pub warnings: Vec<String>,
+}
+
+impl Opened {
+    /// Says what the user should know before the run.
+    pub fn warn(&self) {
+        self.warnings.iter().for_each(|warning| note!("warning: {warning}"));
+    }
+}
+
+impl Resources {
+    /// Makes the pool of threads that was asked for.
+    pub fn start_threads(&self) -> anyhow::Result<()> {
+        start_threads(self.threads)
+    }
+}
+
+/// Starts that many threads, for everything that shares work; by default as many as there are cores.
+pub fn start_threads(threads: Option<NonZeroUsize>) -> anyhow::Result<()> {
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global().context("--threads")?;
+    }
+    Ok(())
+}
+
+impl SourceJob {
+    /// The scene, as whoever opens it takes it.
+    fn scene(&self) -> Option<&OsStr> {
+        self.scene.as_deref().map(Path::as_os_str)
+    }
+
+    /// The same from whatever folder it is opened.
+    pub fn absolute(&self) -> anyhow::Result<Self> {
+        let is_name = |scene: &JobPath| {
+            matches!(self.kind, SourceKind::Ptwne(_)) && scene.to_str().and_then(scenes::by_name).is_some()
+        };
+        let scene = match &self.scene {
+            Some(scene) if !is_name(scene) => Some(scene.absolute().context("the current folder")?),
+            scene => scene.clone(),
+        };
+        let mut all = Self { scene, ..self.clone() };
+        if let Some(root) = &mut all.scene_files.root {
+            *root = std::path::absolute(&*root).context("the current folder")?;
+        }
+        Ok(all)
+    }
+
+    /// The source of a frame of a sequence: {frame} is filled in in the name of the scene and in values of
+    /// its parameters. The frame has a seed of its own, whatever other frames there are, unless all have the same.
+    #[must_use]
+    pub fn of_frame(&self, frame: u32) -> Self {
+        let seed = if self.same_seed { self.seed } else { seed_of_frame(self.seed, frame) };
+        let scene = self.scene.as_ref().map(|scene| scene.of_frame(frame));
+        let mut one = Self { scene, seed, same_seed: false, ..self.clone() };
+        for value in one.scene_files.parameters.values_mut() {
+            *value = JobPath::from(&*value).of_frame(frame).to_string_lossy().into_owned();
+        }
+        one
+    }
+
+    /// Whether the name of the scene says which frame it is of; what is in front of that.
+    pub fn check_frames(&self) -> anyhow::Result<PathBuf> {
+        let Some(scene) = &self.scene else {
+            refuse!("--frames needs a scene with {{frame}} in its name, as in 'hall.{{frame:04}}.xml'")
+        };
+        let Some(before) = scene.before_frame() else {
+            refuse!("--frames: '{}' does not hold {{frame}} or {{frame:04}} once", scene.display())
+        };
+        Ok(before)
+    }
+
+    /// Where samples come from, for the picture's file; none for pictures that are played back. What else
+    /// they depend on beside seed and size goes in as a digest: pictures travel further than paths should.
+    pub fn origin(&self, scene: &str, source: &str, repeats: bool) -> anyhow::Result<Option<SampleOrigin>> {
+        if self.kind == SourceKind::Exr {
+            return Ok(None);
+        }
+        let options = serde_json::to_vec(&Self { seed: 0, size: None, ..self.absolute()? })?;
+        let options = blake3::hash(&options).to_hex()[..16].to_owned();
+        let source = format!("{scene} by {source}");
+        Ok(Some(SampleOrigin { source, options, seed: self.seed, repeats }))
+    }
+
+    /// Opens the source.
+    pub fn open(&self, resources: Resources) -> anyhow::Result<Opened> {
+        match &self.kind {
+            SourceKind::Ptwne(options) => self.open_ptwne(*options),
+            SourceKind::Exr => {
+                let folder = self.scene().context("--source exr needs a folder of pictures")?;
+                let source = Box::new(StackSource::open(folder)?);
+                Ok(Opened { source, scene: stem(folder), warnings: Vec::new() })
+            }
+            SourceKind::Command(template) => adapters::open_command(template, self, resources),
+            SourceKind::Adapter(adapter) => adapters::open_adapter(adapter, self, resources),
+        }
+    }
+
+    fn open_ptwne(&self, options: PtwneOptions) -> anyhow::Result<Opened> {
+        let Loaded { scene, size, max_depth, clamp: asked, warnings } =
+            load(self.scene().unwrap_or(OsStr::new(DEFAULT_SCENE)), &self.scene_files)?;
+        let (width, height) = self.size.or(size).unwrap_or(DEFAULT_SIZE);
+        let name = scene.name().to_owned();
+        let PtwneOptions { estimator, sampling, filter, clamp } = options;
+        let options = RenderOptions {
+            seed: self.seed,
+            max_depth: self.max_depth.or(max_depth).unwrap_or(DEFAULT_DEPTH),
+            estimator,
+            sampling,
+            filter,
+            clamp: clamp.or(asked),
+            ..RenderOptions::default()
+        };
+        let source = Box::new(Ptwne::new(scene, width, height, options)?.with_program(program_digest()?));
+        let warnings = group_warnings(&warnings).iter().map(ToString::to_string).collect();
+        Ok(Opened { source, scene: name, warnings })
+    }
+}
+
+/// The seed of a frame. Scattered, since some renderers derive related random numbers from neighbouring seeds; of as
+/// many bits as all languages take for an integer.
+fn seed_of_frame(seed: u64, frame: u32) -> u64 {
+    let mut words = [0; 12];
+    words[..8].copy_from_slice(&seed.to_le_bytes());
+    words[8..].copy_from_slice(&frame.to_le_bytes());
+    let digest = blake3::hash(&words);
+    let first: [u8; 8] = std::array::from_fn(|i| digest.as_bytes()[i]);
+    u64::from_le_bytes(first) >> 11
+}
+
+/// A built-in scene of that name, or the scene in that file.
+fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
+    if let Some(scene) = scene.to_str().and_then(scenes::by_name) {
+        return Ok(Loaded { scene, size: None, max_depth: None, clamp: None, warnings: vec![] });
+    }
+    let path = Path::new(scene);
+    if path.extension().is_none() && !path.exists() {
+        let typed = scene.to_string_lossy();
+        let names = scenes::list().chain(scenes::stiff()).map(|scene| scene.name);
+        let near = names.min_by_key(|name| edits(&typed, name)).filter(|name| edits(&typed, name) <= 2);
+        let meant = near.map_or(String::new(), |name| format!("did you mean {name}? "));
+        bail!(
+            "there is no built-in scene {scene:?}, and no file of that name; {meant}`noisefloor scenes` \
+             lists the scenes"
+        );
+    }
+    Ok(noisefloor_scenefile::load_with(path, options)?)
+}
+
+/// Letters to add, leave out or replace to make one word of the other (Levenshtein 1966).
+fn edits(one: &str, other: &str) -> usize {
+    let other: Vec<char> = other.chars().collect();
+    let mut row: Vec<usize> = (0..=other.len()).collect();
+    for (i, a) in one.chars().enumerate() {
+        let mut before = std::mem::replace(&mut row[0], i + 1);
+        for (j, b) in other.iter().enumerate() {
+            let replaced = before + usize::from(a != *b);
+            before = row[j + 1];
+            row[j + 1] = replaced.min(before + 1).min(row[j] + 1);
+        }
+    }
+    row[other.len()]
+}
+
+/// `hall` of `rooms/hall.xml`, and of `rooms/hall/`.
+fn stem(path: &OsStr) -> String {
+    let stem = Path::new(path).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    stem.unwrap_or_else(|| "scene".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn frames_have_seeds_of_their_own() {
+        let seeds = (1..4).flat_map(|seed| (0..5000).map(move |frame| seed_of_frame(seed, frame)));
+        let seeds: HashSet<u64> = seeds.collect();
+        assert!(seeds.len() == 15_000 && seeds.iter().all(|&seed| seed < 1 << 53));
+    }
+}

@@ -1,0 +1,34 @@
+//! Errors. Every message says what happened, where, and what to do.
+
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why a page cannot be shown.
+#[derive(Debug, Error)]
+pub enum PagesError {
+    /// The server cannot listen on an address.
+    #[error("cannot listen on {address}: {source}; choose another port with --port")]
+    Listen {
+        /// The address.
+        address: String,
+        /// The error of the operating system.
+        source: io::Error,
+    },
+    /// A language file, or the folder of them, cannot be read.
+    #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: io::Error,
+    },
+    /// A language file is invalid.
+    #[error("{}: {what}; docs/studies.md says what a language file holds", path.display())]
+    Language {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the line number if known.
+        what: String,
+    },
+}

@@ -1,0 +1,111 @@
+//! Your own pictures in the browser: verdicts per tile, disagreements, and retraining.
+//!
+//! Pictures ([`GalleryPicture`]) stay in memory and are judged as by `noisefloor judge`. Disagreements are
+//! stored in a database ([`Disagreements`]). [`retrain`] learns from them and reports the effect. Nothing
+//! leaves the machine.
+
+mod answers;
+mod api;
+mod app;
+mod ask;
+mod gallery;
+mod images;
+mod job;
+mod learn;
+mod line;
+mod pages;
+mod verdicts;
+
+pub use answers::{Disagreement, Disagreements, TileAnswer, read_answers};
+pub use app::ExploreSetup;
+pub use gallery::GalleryPicture;
+pub use learn::{AnswerAgreement, LearnStep, Learned, retrain};
+pub use line::{PersonalLine, fit_line};
+
+use crate::error::StudyError;
+use app::App;
+use axum::Router;
+use axum::middleware::{from_fn, from_fn_with_state};
+use axum::routing::{delete, get, post, put};
+use gallery::Gallery;
+use noisefloor_pages::http::{self, Exposure, Guard, Listening};
+use std::future::Future;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
+
+/// A bound server, ready to run.
+#[derive(Debug)]
+pub struct ExploreServer {
+    listening: Listening,
+    router: Router,
+}
+
+impl ExploreServer {
+    /// Reads the pictures, opens the database and binds the address. Port 0 picks a free port. `exposure`
+    /// says under which other names and behind which proxies it may be reached; a base path is ignored.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a picture or the database cannot be read, or the address is in use.
+    pub async fn bind(
+        setup: ExploreSetup,
+        address: SocketAddr,
+        exposure: &Exposure,
+    ) -> Result<Self, StudyError> {
+        let mut gallery = Gallery::new(setup.tile);
+        for path in &setup.pictures {
+            gallery
+                .add(GalleryPicture::read(path)?)
+                .map_err(|error| StudyError::Explore(error.to_string()))?;
+        }
+        let kept = Arc::new(Disagreements::open(&setup.database)?);
+        let listening = Listening::bind(address, exposure).await?;
+        let app = Arc::new(App {
+            setup,
+            kept,
+            gallery: Mutex::new(gallery),
+            judged: tokio::sync::Mutex::default(),
+            incoming: tokio::sync::Mutex::default(),
+            job: Arc::default(),
+        });
+        let guard = Arc::new(Guard::new(listening.address(), exposure));
+        Ok(Self { listening, router: router(app, guard) })
+    }
+
+    /// The bound address.
+    pub fn address(&self) -> SocketAddr {
+        self.listening.address()
+    }
+
+    /// Serves until `stop` resolves.
+    ///
+    /// # Errors
+    /// [`StudyError::Pages`] if the socket fails.
+    pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), StudyError> {
+        self.listening.serve(self.router, stop).await;
+        Ok(())
+    }
+}
+
+fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
+    Router::new()
+        .route("/", get(pages::page))
+        .route("/{file}", get(pages::file))
+        .route("/api/texts/{language}", get(pages::texts))
+        .route("/api/state", get(api::state))
+        .route("/api/arrangement", put(api::arrange))
+        .route("/api/pictures", delete(api::clear))
+        .route("/api/pictures/{name}", post(api::add).put(api::change).delete(api::remove))
+        .route("/api/pictures/{name}/shown.png", get(api::shown))
+        .route("/api/pictures/{name}/noise.png", get(api::noise))
+        .route("/api/verdicts", post(ask::verdicts))
+        .route("/api/disagreements", post(ask::disagree))
+        .route("/api/disagreements/{id}", delete(ask::take_back))
+        .route("/api/line", post(ask::line))
+        .route("/api/retrain", get(ask::progress).post(ask::retrain))
+        .route("/api/retrained.nfm", get(ask::retrained))
+        .fallback(http::nothing_here)
+        .method_not_allowed_fallback(http::wrong_method)
+        .layer(from_fn_with_state(guard, http::check))
+        .layer(from_fn(http::security_headers))
+        .with_state(app)
+}
