@@ -70,7 +70,7 @@ pub use config::{
     AnswerOption, MAX_STACKS, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
 };
 pub use error::{StoreError, StudyError};
-pub use event::{Choice, Envelope, StudyEvent, TrialTiming};
+pub use event::{Choice, Envelope, LoopFrames, StudyEvent, TrialTiming};
 pub use http::{Exposure, interrupted};
 pub use languages::{Direction, Language, read_languages};
 pub use questplus::{GUESS, LAPSE, Posterior, QuestGrid, QuestPlus, right, sees};

@@ -43,4 +43,6 @@ pub(super) struct StackEntry {
     /// Where each tile stopped: `stops.csv` of `noisefloor render`, or a table with the columns `tile` and
     /// `spp`.
     pub(super) stops: Option<PathBuf>,
+    /// Frames per second of a loop: the folder then has a folder of pictures for each frame.
+    pub(super) fps: Option<f64>,
 }
