@@ -6,6 +6,7 @@ command, which is what is measured).
     docs/benchmarks/film.py render FOLDER NOISEFLOOR     renders that are there are kept; on two cores an hour
     docs/benchmarks/film.py table FOLDER NOISEFLOOR
     docs/benchmarks/film.py denoised FOLDER NOISEFLOOR   needs mitsuba-oidn==0.1.2 as well
+    docs/benchmarks/film.py camera FOLDER NOISEFLOOR     cameras that move, in scenes of moving.py; on two cores an hour
     docs/benchmarks/film.py forecast FOLDER NOISEFLOOR   what sequences take and what was forecast; needs only numpy
 
 Frames are renders of a still view with one seed each. The truth is the mean of all of them, each by its samples. All are
@@ -167,6 +168,45 @@ def truth_of(scene):
     exposure = 0.18 / math.exp(np.mean(np.log(truth @ weights + 1e-6)))
     return pictures, shown(truth, exposure), exposure
 
+
+if task == "camera":
+    from moving import write_frames
+
+    count, edge, converged, levels, rate = 48, 96, 512, (16, 48), 24.0
+
+    def rendered(pattern, frame, seed, spp):
+        """Linear pictures of a frame."""
+        name = f"{pathlib.Path(pattern).name.split('.')[0]}-{frame}-{seed}-{spp}"
+        out = folder / name
+        if not (out / "image.exr").exists():
+            subprocess.run([program, "render", pattern.replace("{frame:04}", f"{frame:04}"), "--size", f"{edge}x{edge}",
+                            "--criterion", f"spp:{spp}", "--max-spp", str(spp), "--autosave", "0", "--seed", str(seed),
+                            "--quiet", "--force", "--out", str(out)], check=True, stderr=subprocess.DEVNULL)
+        channels = OpenEXR.File(str(out / "image.exr")).channels()
+        if "RGB" in channels:
+            return np.asarray(channels["RGB"].pixels, dtype=np.float64)[..., :3]
+        return np.stack([np.asarray(channels[c].pixels, dtype=np.float64) for c in "RGB"], axis=-1)
+
+    print("| a camera that moves, 24 fps | spp | package | here | the same view standing still: package, here |\n"
+          "|---|---|---|---|---|", flush=True)
+    for scene, move in (("blocks", "around"), ("hall", "along")):
+        pattern = write_frames(folder / "scenes", scene, move, count)
+        truth = [rendered(pattern, frame, 1000 + frame, converged) for frame in range(1, count + 1)]
+        exposure = 0.18 / math.exp(np.mean([np.mean(np.log(one @ weights + 1e-6)) for one in truth]))
+        beside = [shown(one, exposure) for one in truth]
+        middle = count // 2
+        for spp in levels:
+            moved = [shown(rendered(pattern, frame, frame, spp), exposure) for frame in range(1, count + 1)]
+            # The frame in the middle, with new noise in each
+            stood = [shown(rendered(pattern, middle, 100 + i, spp), exposure) for i in range(count)]
+            alike = [beside[middle - 1]] * count
+            step = count // JUDGED
+            cells = [film(moved, beside, rate), here(moved[::step], beside[::step], f"{DISPLAY},fps=24"),
+                     film(stood, alike, rate), here(stood[::step], alike[::step], f"{DISPLAY},fps=24")]
+            package, found, standing, found_standing = cells
+            print(f"| {scene}, {move} | {spp} | {package:.2f} | {found:.2f} | {standing:.2f}, {found_standing:.2f} |",
+                  flush=True)
+    sys.exit()
 
 if task == "denoised":
     import mitsuba_oidn as oidn

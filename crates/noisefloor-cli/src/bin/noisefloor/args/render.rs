@@ -224,7 +224,8 @@ impl FromStr for ExposureFrom {
     }
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+/// Frames per second that the vision model takes.
+pub(super) fn rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().map_err(|_| "expected frames per second, such as 24".to_owned())?;
     Viewing::default().with_frames_per_second(Some(rate)).map_err(|error| error.to_string())?;
     Ok(rate)
