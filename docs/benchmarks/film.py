@@ -6,11 +6,13 @@ command, which is what is measured).
     docs/benchmarks/film.py render FOLDER NOISEFLOOR     renders that are there are kept; on two cores an hour
     docs/benchmarks/film.py table FOLDER NOISEFLOOR
     docs/benchmarks/film.py denoised FOLDER NOISEFLOOR   needs mitsuba-oidn==0.1.2 as well
+    docs/benchmarks/film.py camera FOLDER NOISEFLOOR     cameras that move, in scenes of moving.py; on two cores an hour
+    docs/benchmarks/film.py forecast FOLDER NOISEFLOOR   what sequences take and what was forecast; needs only numpy
 
 Frames are renders of a still view with one seed each. The truth is the mean of all of them, each by its samples. All are
 shown by Reinhard's operator at the exposure of the truth, in 8 bits. Of a film, what is lost is pooled over its frames as
 the package does, after the first quarter of a second, in which the package sees the first frame standing still."""
-import json, math, pathlib, subprocess, sys, tempfile
+import csv, json, math, pathlib, subprocess, sys, tempfile
 import numpy as np
 
 SCENES = {s: (16, 48, 128) for s in ("cornell-box", "arcade")}
@@ -30,6 +32,70 @@ if task == "render":
             size, stop = f"{EDGE}x{EDGE}", ["--criterion", f"spp:{spp}", "--max-spp", str(spp), "--autosave", "0"]
             subprocess.run([program, "render", scene, "--size", size, *stop, "--seed", str(seed), "--quiet", "--force",
                             "--out", str(out)], check=True)
+    sys.exit()
+
+if task == "forecast":
+    # Twelve sequences whose camera moves, two seeds each: a forecast first, then the rest of the frames
+    from moving import MOVES, SCENES as MOVING, write_frames
+
+    count, size, rows = 24, "96x96", []
+
+    def spread(few):
+        """So many frames at equal distances, counted from 0."""
+        return np.floor(np.arange(few) * (count - 1) / (few - 1) + 0.5).astype(int)
+
+    def by_lines(values, few):
+        known = spread(few)
+        return np.interp(np.arange(count), known, values[known]).sum()
+
+    for scene, move, seed in ((s, m, seed) for s in MOVING for m in MOVES for seed in (1, 2)):
+        out, pattern = folder / f"{scene}-{move}-{seed}", write_frames(folder / "scenes", scene, move, count)
+        sequence = [program, "render", "--frames", f"1-{count}", pattern, "--size", size, "--tile", "48", "--fps", "24",
+                    "--max-spp", "4000", "--seed", str(seed), "--out", str(out), "--quiet", "--resume"]
+        if not (out / "forecast.json").exists():
+            subprocess.run([*sequence, "--forecast"], check=True, stderr=subprocess.DEVNULL)
+        subprocess.run(sequence, check=True, stderr=subprocess.DEVNULL)
+        said = json.loads((out / "forecast.json").read_text())
+        # What it took: by the tiles of stops.csv, which are all of one size, and by the reports
+        spp, seconds = np.zeros(count), np.zeros(count)
+        for i in range(count):
+            frame = out / f"{i + 1:04}"
+            with open(frame / "stops.csv") as file:
+                spp[i] = np.mean([int(tile["spp"]) for tile in csv.DictReader(file)])
+            report = json.loads((frame / "report.json").read_text())
+            assert report["samples"] == spp[i] * report["width"] * report["height"] and report["complete"]
+            seconds[i] = sum(report[f"seconds_{part}"] for part in ("before", "setup", "total"))
+        assert said["known"] == list(spread(5) + 1)
+        # The forecast once more, from the same frames
+        for kind, values in (("spp", spp / count), ("seconds", seconds)):
+            assert math.isclose(by_lines(values, 5), said[kind]["expected"], rel_tol=1e-9), (out, kind)
+        rows.append((f"{scene}, {move}", seed, said, spp, seconds))
+        print(f"{out.name}: {said['spp']['expected']:.1f} spp, took {spp.mean():.1f}", file=sys.stderr, flush=True)
+
+    print("| camera | seed | samples per pixel: least, most of a frame | forecast: range | took | off by |"
+          " seconds: forecast, took | off by |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name, seed, said, spp, seconds in rows:
+        of, time = said["spp"], said["seconds"]
+        print(f"| {name} | {seed} | {spp.min():.0f}, {spp.max():.0f} | {of['expected']:.0f}: {of['low']:.0f} to "
+              f"{of['high']:.0f} | {spp.mean():.0f} | ×{of['expected'] / spp.mean():.2f} | {time['expected']:.0f}, "
+              f"{seconds.sum():.0f} | ×{time['expected'] / seconds.sum():.2f} |")
+    off = lambda found, took: math.exp(abs(math.log(found / took)))
+    print("\n| frames | samples: within ×1.25, on average, at most | seconds: within ×1.25, on average, at most |\n|---|---|---|")
+    for few in (3, 5, 7, 9):
+        cells = []
+        for kind in (3, 4):
+            factors = np.array([off(by_lines(row[kind], few), row[kind].sum()) for row in rows])
+            mean = math.exp(np.mean(np.log(factors)))
+            cells.append(f"{(factors <= 1.25).sum()} of {len(rows)}, ×{mean:.3f}, ×{factors.max():.3f}")
+        print(f"| {few} of {count} | {' | '.join(cells)} |")
+    within = [sum(row[2][kind]["low"] <= took <= row[2][kind]["high"] for row, took in
+                  ((row, row[of].mean() if kind == "spp" else row[of].sum()) for row in rows))
+              for kind, of in (("spp", 3), ("seconds", 4))]
+    widths = [math.exp(np.mean([math.log(row[2][kind]["high"] / row[2][kind]["low"]) / 2 for row in rows]))
+              for kind in ("spp", "seconds")]
+    print(f"\nWithin the range: samples {within[0]}, seconds {within[1]} of {len(rows)}. Half a range is ×{widths[0]:.2f} "
+          f"and ×{widths[1]:.2f} on average.")
     sys.exit()
 
 import OpenEXR, torch, pycvvdp
@@ -102,6 +168,45 @@ def truth_of(scene):
     exposure = 0.18 / math.exp(np.mean(np.log(truth @ weights + 1e-6)))
     return pictures, shown(truth, exposure), exposure
 
+
+if task == "camera":
+    from moving import write_frames
+
+    count, edge, converged, levels, rate = 48, 96, 512, (16, 48), 24.0
+
+    def rendered(pattern, frame, seed, spp):
+        """Linear pictures of a frame."""
+        name = f"{pathlib.Path(pattern).name.split('.')[0]}-{frame}-{seed}-{spp}"
+        out = folder / name
+        if not (out / "image.exr").exists():
+            subprocess.run([program, "render", pattern.replace("{frame:04}", f"{frame:04}"), "--size", f"{edge}x{edge}",
+                            "--criterion", f"spp:{spp}", "--max-spp", str(spp), "--autosave", "0", "--seed", str(seed),
+                            "--quiet", "--force", "--out", str(out)], check=True, stderr=subprocess.DEVNULL)
+        channels = OpenEXR.File(str(out / "image.exr")).channels()
+        if "RGB" in channels:
+            return np.asarray(channels["RGB"].pixels, dtype=np.float64)[..., :3]
+        return np.stack([np.asarray(channels[c].pixels, dtype=np.float64) for c in "RGB"], axis=-1)
+
+    print("| a camera that moves, 24 fps | spp | package | here | the same view standing still: package, here |\n"
+          "|---|---|---|---|---|", flush=True)
+    for scene, move in (("blocks", "around"), ("hall", "along")):
+        pattern = write_frames(folder / "scenes", scene, move, count)
+        truth = [rendered(pattern, frame, 1000 + frame, converged) for frame in range(1, count + 1)]
+        exposure = 0.18 / math.exp(np.mean([np.mean(np.log(one @ weights + 1e-6)) for one in truth]))
+        beside = [shown(one, exposure) for one in truth]
+        middle = count // 2
+        for spp in levels:
+            moved = [shown(rendered(pattern, frame, frame, spp), exposure) for frame in range(1, count + 1)]
+            # The frame in the middle, with new noise in each
+            stood = [shown(rendered(pattern, middle, 100 + i, spp), exposure) for i in range(count)]
+            alike = [beside[middle - 1]] * count
+            step = count // JUDGED
+            cells = [film(moved, beside, rate), here(moved[::step], beside[::step], f"{DISPLAY},fps=24"),
+                     film(stood, alike, rate), here(stood[::step], alike[::step], f"{DISPLAY},fps=24")]
+            package, found, standing, found_standing = cells
+            print(f"| {scene}, {move} | {spp} | {package:.2f} | {found:.2f} | {standing:.2f}, {found_standing:.2f} |",
+                  flush=True)
+    sys.exit()
 
 if task == "denoised":
     import mitsuba_oidn as oidn

@@ -162,6 +162,40 @@ fn stops_and_picture_are_those_of_rust_whatever_the_number_of_threads() {
     }
 }
 
+/// With a rate in the viewing conditions, stops are those of a frame of a film in Rust: earlier than a still's.
+#[test]
+fn a_frame_of_a_film_stops_earlier() {
+    let spp = |viewing: &CStr| {
+        let session = session(&NfParams { viewing: viewing.as_ptr(), max_spp: 4000, ..params() });
+        while open(&session) > 0 {
+            round(&session, 1);
+        }
+        states(&session).iter().map(|state| state.spp).collect::<Vec<_>>()
+    };
+    let (still, film) = (spp(c"desk"), spp(c"desk,fps=24"));
+    assert!(film.iter().sum::<u64>() < still.iter().sum::<u64>(), "{film:?} of a film, {still:?} of a still");
+    let viewing = Params::default().viewing.with_frames_per_second(Some(24.0)).unwrap();
+    let rust = Params::default().with_tile(EDGE).with_max_spp(4000).with_viewing(viewing);
+    let mut expected = Session::new(WIDTH, HEIGHT, Oracle::bundled(), rust).unwrap();
+    while !expected.is_done() {
+        for request in expected.requests() {
+            let mean = render(request.tile, request.first, request.spp);
+            expected.push(request.tile.index, request.spp, mean.as_chunks().0).unwrap();
+        }
+        expected.judge().unwrap();
+    }
+    assert_eq!(film, expected.stops().map(|stop| stop.spp).collect::<Vec<_>>());
+    // SAFETY: pointers to variables of this function, and text.
+    unsafe {
+        let (mut oracle, mut session) = (null_mut(), null_mut());
+        assert_eq!(nf_oracle_bundled(0.95, &mut oracle), NfStatus::Ok);
+        let slow = NfParams { viewing: c"desk,fps=4".as_ptr(), ..params() };
+        assert_eq!(nf_session_new(WIDTH, HEIGHT, oracle, &slow, &mut session), NfStatus::Argument);
+        assert!(message().contains("10…1000 frames per second"), "{}", message());
+        nf_oracle_free(oracle);
+    }
+}
+
 #[test]
 fn tiles_of_a_whole_picture_are_cut_out() {
     let (cut, whole) = (session(&params()), session(&params()));

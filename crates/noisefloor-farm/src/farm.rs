@@ -1,5 +1,6 @@
 //! A farm: planned once, then rounds of tasks and merges until every frame is done.
 
+use crate::batch::PlannedBatch;
 use crate::error::FarmError;
 use crate::folder::{FarmFolder, FarmLock};
 use crate::frame::{Frame, Pictures};
@@ -7,7 +8,7 @@ use crate::local::run_local;
 use crate::plan::{Task, split};
 use crate::shard::Shard;
 use crate::slurm::Slurm;
-use crate::state::{FarmPlan, FrameJob, FrameState, Round, RoundState};
+use crate::state::{FarmPlan, FrameJob, FrameRange, FrameState, Round, RoundState};
 use crate::studio::{News, Studio};
 use crate::task::sample;
 use noisefloor::ProgressiveSource;
@@ -107,7 +108,8 @@ impl<'a, S: Studio> Farm<'a, S> {
         let _lock = folder.lock()?;
         let farm = Self { studio, folder, plan };
         for (index, name) in farm.plan.names().iter().enumerate() {
-            farm.frame(index, name).plan().map_err(FarmError::of(name))?;
+            let waits = farm.plan.waits(index);
+            farm.of_job(farm.planned_job(index), name).plan(waits).map_err(FarmError::of(name))?;
         }
         // Last: a farm whose plan was killed is none
         farm.folder.write_plan(&farm.plan)
@@ -137,16 +139,60 @@ impl<'a, S: Studio> Farm<'a, S> {
         &self.folder
     }
 
-    fn frame<'b>(&'b self, index: usize, name: &'b str) -> Frame<'b, S> {
-        Frame { studio: self.studio, folder: &self.folder, name, job: self.job(index), keep: self.plan.keep }
+    fn of_job<'b>(&'b self, job: S::Job, name: &'b str) -> Frame<'b, S> {
+        Frame { studio: self.studio, folder: &self.folder, name, job, keep: self.plan.keep }
     }
 
-    /// The render of a frame.
-    fn job(&self, index: usize) -> S::Job {
+    /// The render of a frame, as far as it is known without other frames.
+    fn planned_job(&self, index: usize) -> S::Job {
         match self.plan.frames {
             Some(frames) => self.studio.of_frame(&self.plan.job, frames.first().saturating_add(index as u32)),
             None => self.plan.job.clone(),
         }
+    }
+
+    /// The render of a frame; those that it waits for are done.
+    fn job(&self, index: usize) -> Result<S::Job, FarmError> {
+        let job = self.planned_job(index);
+        let Some(frames) = self.plan.frames.filter(|_| self.plan.waits(index)) else { return Ok(job) };
+        let of = |&frame: &u32| (frame, self.folder.frame(&FrameRange::folder(frame)));
+        let first: Vec<_> = self.plan.first.iter().map(of).collect();
+        Ok(self.studio.after(&job, frames.first().saturating_add(index as u32), &first)?)
+    }
+
+    /// Whether the frames that others wait for are done.
+    fn are_first_done(&self) -> Result<bool, FarmError> {
+        for &frame in &self.plan.first {
+            if !self.folder.state(&FrameRange::folder(frame))?.done {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Merges a frame; it is nowhere as long as it waits for others.
+    fn merge(
+        &self,
+        index: usize,
+        name: &str,
+        pictures: Pictures,
+    ) -> Result<(FrameState, Vec<PlannedBatch>), FarmError> {
+        let waits = self.plan.waits(index);
+        if waits && !self.are_first_done()? {
+            return Ok((FrameState::default(), Vec::new()));
+        }
+        let frame = self.of_job(self.job(index)?, name);
+        if waits {
+            frame.begin()?;
+        }
+        frame.merge(pictures)
+    }
+
+    /// Frames by their indices: those that others wait for come first.
+    fn in_order(&self) -> impl Iterator<Item = usize> {
+        let frames = self.plan.frames.map_or(1, FrameRange::count);
+        let waiting = |waits| (0..frames).filter(move |&index| self.plan.waits(index) == waits);
+        waiting(false).chain(waiting(true))
     }
 
     /// What a task of the round under way is to do.
@@ -164,7 +210,7 @@ impl<'a, S: Studio> Farm<'a, S> {
             folder: &self.folder,
             frame: self.folder.frame_job(&name)?,
             shard: self.folder.shard(&name, number, task),
-            job: self.job(wanted.frame),
+            job: self.job(wanted.frame)?,
             task: wanted,
             name,
         })
@@ -258,7 +304,7 @@ impl<J: Serialize> Order<'_, J> {
         source: &mut impl ProgressiveSource,
         cancel: impl Fn() -> bool,
     ) -> Result<Delivery, FarmError> {
-        let FrameJob { scene, source: renderer, shards } = self.frame;
+        let FrameJob { scene, source: renderer, shards, .. } = self.frame;
         let shard: Shard = sample(source, shards, &self.task.batches, cancel)?;
         if shard.is_empty() {
             let what = "stopped before the first batch was there".into();
@@ -283,12 +329,18 @@ impl<S: Studio> Coordinator<'_, S> {
     fn advance(&self) -> Result<Round, FarmError> {
         let Farm { folder, plan, .. } = &self.farm;
         let before = folder.round()?;
-        let (mut wanted, mut samples) = (Vec::new(), 0);
-        for (index, name) in plan.names().iter().enumerate() {
-            let grid = folder.frame_job(name)?.shards.grid().map_err(FarmError::Edited);
-            let merged = self.farm.frame(index, name).merge(Pictures::WhenDone);
-            let (state, batches) = merged.map_err(FarmError::of(name))?;
+        let (names, mut samples) = (plan.names(), 0);
+        let mut needs = vec![Vec::new(); names.len()];
+        for index in self.farm.in_order() {
+            let name = &names[index];
+            let (state, batches) =
+                self.farm.merge(index, name, Pictures::WhenDone).map_err(FarmError::of(name))?;
             samples += state.samples;
+            needs[index] = batches;
+        }
+        let mut wanted = Vec::new();
+        for (name, batches) in names.iter().zip(needs) {
+            let grid = folder.frame_job(name)?.shards.grid().map_err(FarmError::Edited);
             wanted.push((grid.map_err(FarmError::of(name))?, batches));
         }
         let planned = now();
@@ -315,7 +367,7 @@ impl<S: Studio> Coordinator<'_, S> {
     pub fn merge(&self) -> Result<Vec<(String, FrameState)>, FarmError> {
         let names = self.farm.plan.names();
         let merge = |(index, name): (usize, String)| {
-            let merged = self.farm.frame(index, &name).merge(Pictures::Always);
+            let merged = self.farm.merge(index, &name, Pictures::Always);
             let (state, _) = merged.map_err(FarmError::of(&name))?;
             Ok((name, state))
         };

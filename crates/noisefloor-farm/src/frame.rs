@@ -33,8 +33,8 @@ pub(crate) struct Frame<'a, S: Studio> {
 }
 
 impl<S: Studio> Frame<'_, S> {
-    /// Opens the scene once, and keeps what it is.
-    pub(crate) fn plan(&self) -> Result<(), FarmError> {
+    /// Opens the scene once, and keeps what it is; `waits` says whether its job is to change once others are done.
+    pub(crate) fn plan(&self, waits: bool) -> Result<(), FarmError> {
         let path = self.folder.frame(self.name);
         if let Some(file) = self.studio.occupied(&path) {
             let what = format!(
@@ -53,7 +53,19 @@ impl<S: Studio> Frame<'_, S> {
             return Err(FarmError::Reference);
         }
         let shards = ShardJob::of(identity, &session);
-        self.folder.write_frame_job(self.name, &FrameJob { scene, source: info.name, shards })
+        self.folder.write_frame_job(self.name, &FrameJob { scene, source: info.name, shards, waits })
+    }
+
+    /// Takes up the job that follows from the frames that this one has waited for. Its scene is not opened again.
+    pub(crate) fn begin(&self) -> Result<(), FarmError> {
+        let frame = self.folder.frame_job(self.name)?;
+        if !frame.waits {
+            return Ok(());
+        }
+        let ShardJob { source, width, height, .. } = frame.shards;
+        let session = self.session((width, height), source.clone())?;
+        let shards = ShardJob::of(source, &session);
+        self.folder.write_frame_job(self.name, &FrameJob { shards, waits: false, ..frame })
     }
 
     /// The session that a render of that source would have. Its state must be known.
@@ -193,7 +205,7 @@ pub fn merge_shards<S: Studio>(
     now.check(&shards).map_err(FarmError::Edited)?;
 
     let (scene, source) = first.names().unwrap_or(("unnamed scene", "unnamed renderer"));
-    let frame = FrameJob { scene: scene.to_owned(), source: source.to_owned(), shards };
+    let frame = FrameJob { scene: scene.to_owned(), source: source.to_owned(), shards, waits: false };
     let mut files = studio.files(&job, &frame, out, force)?;
     let mut set = ShardSet::gather(&now, paths);
     let merged = set.merge_into(&mut session)?;

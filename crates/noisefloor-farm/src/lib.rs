@@ -10,6 +10,7 @@
 //!   are those of one machine, to the bit, whatever the order, number and size of the shards.
 //! - A [`Farm`] is planned once; a [`Coordinator`] then runs rounds of tasks and merges on this machine or on
 //!   [`Slurm`]. A [`FarmFolder`] is all its state: what is rendered, the round under way, and how far each frame is.
+//! - A [`Forecast`] says what a sequence will take, from some of its frames.
 //! - A [`Studio`] opens sources and writes pictures; the farm knows neither.
 //!
 //! ```
@@ -43,6 +44,7 @@ mod error;
 mod farm;
 mod file;
 mod folder;
+mod forecast;
 mod frame;
 mod local;
 mod merge;
@@ -57,6 +59,7 @@ pub use batch::PlannedBatch;
 pub use error::{FarmError, ShardError, StudioError};
 pub use farm::{Coordinator, Delivery, Farm, FarmProgress, FrameProgress, Order};
 pub use folder::{FarmFolder, FarmLock};
+pub use forecast::Forecast;
 pub use frame::{MergedShards, merge_shards};
 pub use local::run_local;
 pub use merge::{Merged, Problem, ShardSet};

@@ -41,6 +41,26 @@ impl FrameRange {
         self.first..=self.last
     }
 
+    /// How many.
+    pub fn count(self) -> usize {
+        (self.last - self.first) as usize + 1
+    }
+
+    /// Whether it has this frame.
+    pub fn contains(self, frame: u32) -> bool {
+        (self.first..=self.last).contains(&frame)
+    }
+
+    /// So many frames at equal distances, from the first to the last; at least these two, and at most all.
+    pub fn spread(self, frames: usize) -> Vec<u32> {
+        let gaps = frames.clamp(2, self.count().max(2)) as u64 - 1;
+        let span = u64::from(self.last - self.first);
+        let mut spread: Vec<u32> =
+            (0..=gaps).map(|i| self.first + ((i * span + gaps / 2) / gaps) as u32).collect();
+        spread.dedup();
+        spread
+    }
+
     /// The folder of a frame of a sequence.
     pub fn folder(frame: u32) -> String {
         format!("{frame:04}")
@@ -91,12 +111,29 @@ pub struct FarmPlan<J> {
     pub tasks: usize,
     /// Whether shards are kept once they are merged.
     pub keep: bool,
+    /// Frames of the sequence that the others wait for ([`Studio::after`](crate::Studio::after)).
+    #[serde(default)]
+    pub first: Vec<u32>,
 }
 
 impl<J> FarmPlan<J> {
     /// A render in rounds of at most about `tasks` tasks; with `keep`, shards outlive their merge.
     pub fn new(job: J, frames: Option<FrameRange>, tasks: usize, keep: bool) -> Self {
-        Self { version: PLAN_VERSION, job, frames, tasks, keep }
+        Self { version: PLAN_VERSION, job, frames, tasks, keep, first: Vec::new() }
+    }
+
+    /// The same, where all other frames wait for these, and take from them what they have come to: an exposure.
+    /// Frames that the sequence does not have are left out.
+    #[must_use]
+    pub fn with_first(self, mut first: Vec<u32>) -> Self {
+        first.retain(|frame| self.frames.is_some_and(|frames| frames.contains(*frame)));
+        Self { first, ..self }
+    }
+
+    /// Whether the frame of this index waits for others.
+    pub(crate) fn waits(&self, index: usize) -> bool {
+        let from = self.frames.map_or(0, FrameRange::first);
+        !self.first.is_empty() && !self.first.iter().any(|frame| frame.saturating_sub(from) as usize == index)
     }
 
     /// Names of the frames: of their folders.
@@ -117,6 +154,9 @@ pub struct FrameJob {
     pub source: String,
     /// What its samples are of.
     pub shards: ShardJob,
+    /// Whether it waits for other frames: its job is then not known in full.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub waits: bool,
 }
 
 /// How far a frame is.

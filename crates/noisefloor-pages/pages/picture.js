@@ -1,5 +1,6 @@
 // Pictures made of tiles, one image pixel on one device pixel.
 
+/** Pictures of tiles that are kept: each has one a frame. */
 const MOST_TILES = 4000;
 const RETRY_MS = 1000;
 /** A window narrower than this, without a precise pointer, is a telephone. */
@@ -22,17 +23,19 @@ async function load(path) {
   }
 }
 
-/** A tile of a level; kept, since observers go back and forth. */
-export function tile(stack, level, index) {
-  const path = `api/tiles/${stack}/${level}/${index}.png`;
+/** The frames of a tile of a level, one of a still; kept, since observers go back and forth. */
+export function tile(study, stack, level, index) {
+  const { frames = 1 } = study.stacks[stack];
+  const path = `api/tiles/${stack}/${level}/${index}`;
   let found = tiles.get(path);
   tiles.delete(path);
-  found ??= load(path).catch((error) => {
+  const name = (frame) => (frame === 0 ? `${path}.png` : `${path}.${frame}.png`);
+  found ??= Promise.all(Array.from({ length: frames }, (_, frame) => load(name(frame)))).catch((error) => {
     tiles.delete(path);
     throw error;
   });
   tiles.set(path, found);
-  if (tiles.size > MOST_TILES) tiles.delete(tiles.keys().next().value);
+  if (tiles.size * frames > MOST_TILES) tiles.delete(tiles.keys().next().value);
   return found;
 }
 
@@ -65,8 +68,11 @@ export function snap(element) {
 export class Picture {
   /** `onMisfit` hears that the browser would scale the picture, or no longer does. */
   constructor(study, stack, label, onMisfit = () => {}) {
+    this.study = study;
     this.stack = stack;
     this.shape = study.stacks[stack];
+    /** Of a loop: what became of its frames. */
+    this.frames = { shown: 0, dropped: 0 };
     // As the server cuts them: what is left of less than half a tile belongs to the last one
     const along = (length) => Math.max(1, Math.round(length / this.shape.tile));
     [this.columns, this.rows] = [along(this.shape.width), along(this.shape.height)];
@@ -97,6 +103,7 @@ export class Picture {
   }
 
   close() {
+    cancelAnimationFrame(this.playing);
     this.observer.disconnect();
     misfits.delete(this);
   }
@@ -110,6 +117,8 @@ export class Picture {
   }
 
   blank() {
+    cancelAnimationFrame(this.playing);
+    this.bitmaps = null;
     this.context.fillStyle = "rgb(119 119 119)";
     this.context.fillRect(0, 0, this.shape.width, this.shape.height);
   }
@@ -125,10 +134,16 @@ export class Picture {
     return place(y, this.rows) * this.columns + place(x, this.columns);
   }
 
-  /** Loads all tiles; resolves to what draws them at once. */
+  /** Loads all tiles, every frame decoded; resolves to what draws them at once. */
   async load(levels) {
-    const all = await Promise.all(levels.map((level, i) => tile(this.stack, level, i)));
-    return () => all.forEach((bitmap, i) => this.context.drawImage(bitmap, ...this.place(i)));
+    const all = await Promise.all(levels.map((level, i) => tile(this.study, this.stack, level, i)));
+    return () => {
+      this.bitmaps = all;
+      this.frame = this.frameAt(performance.now());
+      this.draw();
+      cancelAnimationFrame(this.playing);
+      if (this.shape.frames > 1) this.play();
+    };
   }
 
   /** Shows all tiles at once, when all are there. */
@@ -137,7 +152,38 @@ export class Picture {
   }
 
   async showTile(level, index) {
-    this.context.drawImage(await tile(this.stack, level, index), ...this.place(index));
+    const bitmaps = await tile(this.study, this.stack, level, index);
+    if (!this.bitmaps) return;
+    this.bitmaps[index] = bitmaps;
+    this.drawTile(index);
+  }
+
+  drawTile(index) {
+    const bitmaps = this.bitmaps[index];
+    this.context.drawImage(bitmaps[this.frame % bitmaps.length], ...this.place(index));
+  }
+
+  draw() {
+    this.bitmaps.forEach((_, index) => this.drawTile(index));
+  }
+
+  /** By one clock for all pictures: those side by side show the same frame. */
+  frameAt(ms) {
+    return Math.floor((ms * (this.shape.fps ?? 0)) / 1000);
+  }
+
+  /** Draws the frame that is due whenever the browser is going to show one. */
+  play() {
+    this.playing = requestAnimationFrame((now) => {
+      const due = this.frameAt(now);
+      if (due > this.frame) {
+        this.frames.dropped += due - this.frame - 1;
+        this.frames.shown += 1;
+        this.frame = due;
+        this.draw();
+      }
+      this.play();
+    });
   }
 
   /** Short marks at the corners of a tile, outside of it. */

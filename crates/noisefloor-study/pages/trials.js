@@ -120,6 +120,9 @@ class Room {
   answer(event) {
     if (this.early() || this.closed) return;
     const timing = { onset: this.shown, ms: this.elapsed(), intervals: this.intervals };
+    // Pictures side by side are drawn together
+    const [{ shape, frames }] = this.pictures;
+    if (shape.frames > 1) timing.frames = frames;
     this.send({ ...event, trial: this.trial.number, timing });
     this.finish("answered");
   }
@@ -173,10 +176,10 @@ async function acquisition(room) {
     levels[index] = level;
     room.send({ kind: "step", trial: trial.number, tile: index, level, at, ms: room.elapsed() });
     // A tile that came late must not cover a later one
-    tile(trial.stack, shown(level), index).then(
+    tile(study, trial.stack, shown(level), index).then(
       () => levels[index] === level && test.showTile(shown(level), index),
     );
-    if (level < last) tile(trial.stack, shown(level + 1), index);
+    if (level < last) tile(study, trial.stack, shown(level + 1), index);
     undo.disabled = history.length === 0;
   };
   const point = (x, y, by) => {
@@ -248,14 +251,14 @@ function pointing(test, point) {
 }
 
 async function validation(room) {
-  const { trial, t } = room;
+  const { study, trial, t } = room;
   const left = room.picture(t.left);
   const right = room.picture(t.right);
   room.show(figure(left, ""), figure(right, ""));
   room.say.textContent = t.loading;
   // Both appear at once: what comes first would tell them apart
   const all = [...trial.left, ...trial.right];
-  await Promise.all(all.map((level, i) => tile(trial.stack, level, i % trial.left.length)));
+  await Promise.all(all.map((level, i) => tile(study, trial.stack, level, i % trial.left.length)));
   await Promise.all([left.show(trial.left), right.show(trial.right)]);
   room.say.textContent = t.validation_how;
   const answer = (choice) => () => room.answer({ kind: "answer", choice });
@@ -273,8 +276,8 @@ async function forcedChoice(room) {
   room.say.textContent = t.loading;
   const levels = (level) =>
     Array.from({ length: picture.count }, (_, i) => (i === trial.tile ? level : last));
-  const all = levels(last).map((level, i) => tile(trial.stack, level, i));
-  await Promise.all([...all, ...[trial.first, trial.second].map((l) => tile(trial.stack, l, trial.tile))]);
+  const all = levels(last).map((level, i) => tile(study, trial.stack, level, i));
+  await Promise.all([...all, ...[trial.first, trial.second].map((l) => tile(study, trial.stack, l, trial.tile))]);
   const pause = room.bind("P", t.pause, () => room.finish("pause"));
 
   room.say.textContent = t.look_here;

@@ -81,6 +81,9 @@ struct StackDesign<'a> {
     tile: usize,
     levels: &'a [u64],
     stops: Option<&'a [u32]>,
+    /// Frames, and their rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    film: Option<(u32, f64)>,
 }
 
 impl Study {
@@ -121,6 +124,7 @@ impl Study {
                 renderer: entry.renderer,
                 folder: beside.join(entry.folder),
                 stops: entry.stops.map(|stops| beside.join(stops)),
+                fps: entry.fps,
                 tile,
             })
         };
@@ -163,6 +167,7 @@ impl Study {
                 tile: s.grid().edge(),
                 levels: s.levels(),
                 stops: s.stops(),
+                film: s.fps().map(|fps| (s.frames(), fps)),
             }
         };
         let Self { protocol, repeats, trials, seed, .. } = *self;
@@ -287,13 +292,16 @@ fn check_stacks(file: &StudyFile) -> Result<(), String> {
         return Err(format!("{} [[stack]] entries; a study has 1 to {MAX_STACKS}", file.stack.len()));
     }
     let mut names = BTreeSet::new();
-    for StackEntry { name, stops, .. } in &file.stack {
+    for StackEntry { name, stops, fps, .. } in &file.stack {
         let folder = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
         if !is_plain(name) || !name.chars().all(folder) || name.starts_with('.') {
             return Err(format!("stack name {name:?} is not a plain name: letters, digits, - and _"));
         }
         if !names.insert(name) {
             return Err(format!("two stacks are called {name:?}"));
+        }
+        if fps.is_some_and(|fps| !(1.0..=240.0).contains(&fps)) {
+            return Err(format!("stack {name:?}: fps is the rate of a film, 1 to 240 frames a second"));
         }
         if file.protocol == StudyProtocol::Validation && stops.is_none() {
             return Err(format!(
@@ -500,4 +508,6 @@ pub(super) struct StackEntry {
     /// Where each tile stopped: `stops.csv` of `noisefloor render`, or a table with the columns `tile` and
     /// `spp`.
     pub(super) stops: Option<PathBuf>,
+    /// Frames per second of a loop: the folder then has a folder of pictures for each frame.
+    fps: Option<f64>,
 }

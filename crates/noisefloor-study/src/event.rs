@@ -73,6 +73,19 @@ pub struct TrialTiming {
     /// Forced choice: measured display time of each interval, in milliseconds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub intervals: Vec<f64>,
+    /// Of a loop: what became of its frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<LoopFrames>,
+}
+
+/// How smoothly a loop was shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoopFrames {
+    /// Frames that were drawn.
+    pub shown: u32,
+    /// Frames whose time passed before the browser asked for a picture.
+    pub dropped: u32,
 }
 
 impl TrialTiming {

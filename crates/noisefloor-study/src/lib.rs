@@ -63,7 +63,7 @@ pub use config::{
     AnswerOption, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
 };
 pub use error::{StoreError, StudyError};
-pub use event::{Choice, Envelope, StudyEvent, TrialTiming};
+pub use event::{Choice, Envelope, LoopFrames, StudyEvent, TrialTiming};
 pub use server::{
     Beginning, CompletionView, LanguageView, Overview, OverviewRow, SessionView, StackView, StudyServer,
     StudyView,

@@ -17,6 +17,8 @@ pub(crate) const NOISY_SHARE: f64 = 0.3;
 const MAX_TILES: usize = 1024;
 /// Most pixels of a picture; a larger one would not fit on a screen unscaled.
 const MAX_PIXELS: usize = 16 << 20;
+/// Most frames of a loop.
+const MAX_FRAMES: usize = 240;
 /// Most lines of a table of stops.
 const MAX_STOPS: usize = 100_000;
 
@@ -26,10 +28,12 @@ pub(crate) struct Source {
     pub(crate) renderer: String,
     pub(crate) folder: PathBuf,
     pub(crate) stops: Option<PathBuf>,
+    pub(crate) fps: Option<f64>,
     pub(crate) tile: usize,
 }
 
-/// Pictures of one view, ordered by samples per pixel. The last one is the reference.
+/// Pictures of one view, ordered by samples per pixel. The last one is the reference. Each is a still, or a loop of
+/// frames that are shown one after the other.
 #[derive(Debug)]
 pub struct StudyStack {
     name: String,
@@ -37,8 +41,11 @@ pub struct StudyStack {
     folder: PathBuf,
     grid: TileGrid,
     levels: Vec<u64>,
-    paths: Vec<PathBuf>,
-    /// Tone mapping of linear pictures, fitted to the reference and shared by all levels. `None` for PNGs.
+    /// By frame and level.
+    paths: Vec<Vec<PathBuf>>,
+    /// Frames per second of a loop.
+    fps: Option<f64>,
+    /// Tone mapping of linear pictures, fitted to the reference of the first frame and shared by all. `None` for PNGs.
     display: Option<Display>,
     /// Level at which each tile had stopped: the first with at least that many samples.
     stops: Option<Vec<u32>>,
@@ -48,16 +55,27 @@ pub struct StudyStack {
 
 impl StudyStack {
     pub(crate) fn open(source: Source) -> Result<Self, StudyError> {
-        let Source { name, renderer, folder, stops, tile } = source;
-        let frames = running_means(&folder)?;
-        if !(2..=MAX_LEVELS).contains(&frames.len()) {
-            return Err(StudyError::Levels { name, levels: frames.len(), max: MAX_LEVELS });
+        let Source { name, renderer, folder, stops, fps, tile } = source;
+        let folders = if fps.is_some() { frames_of(&folder)? } else { vec![folder.clone()] };
+        let (levels, first) = running(&folders[0])?;
+        if !(2..=MAX_LEVELS).contains(&levels.len()) {
+            return Err(StudyError::Levels { name, levels: levels.len(), max: MAX_LEVELS });
         }
-        let (levels, paths): (Vec<u64>, Vec<PathBuf>) =
-            frames.into_iter().map(|Frame { last, path, .. }| (last, path)).unzip();
+        let mut paths = vec![first];
+        for other in &folders[1..] {
+            let (has, pictures) = running(other)?;
+            if has != levels {
+                let what = format!(
+                    "a frame of stack {name} whose levels are not those of {}: all frames have the same",
+                    folders[0].display()
+                );
+                return Err(StudyError::File { path: other.clone(), what });
+            }
+            paths.push(pictures);
+        }
 
         // The reference determines the size and the tone mapping
-        let reference = read_picture(&paths[paths.len() - 1])?;
+        let reference = read_picture(&paths[0][levels.len() - 1])?;
         let (width, height) = reference.size();
         let grid = TileGrid::new(width, height, tile)
             .map_err(|source| StudyError::Tile { name: name.clone(), source })?;
@@ -82,7 +100,7 @@ impl StudyStack {
             Some(spp.as_ref()?.iter().map(|spp| level_of(share * spp)).collect())
         };
         let (stops, noisy) = (share(1.0), share(NOISY_SHARE));
-        Ok(Self { name, renderer, folder, grid, levels, paths, display, stops, noisy })
+        Ok(Self { name, renderer, folder, grid, levels, paths, fps, display, stops, noisy })
     }
 
     /// Name of the stack; a plain folder name.
@@ -110,6 +128,16 @@ impl StudyStack {
         &self.levels
     }
 
+    /// Frames of the loop; one of a still.
+    pub fn frames(&self) -> u32 {
+        self.paths.len() as u32
+    }
+
+    /// Frames per second of a loop; `None` of a still.
+    pub fn fps(&self) -> Option<f64> {
+        self.fps
+    }
+
     /// The level of the reference.
     pub fn last(&self) -> u32 {
         (self.levels.len() - 1) as u32
@@ -131,7 +159,7 @@ impl StudyStack {
         self.display.is_some()
     }
 
-    /// A level as displayed: sRGB-encoded, three bytes a pixel, row-major.
+    /// A level as displayed, its first frame if it is a loop: sRGB-encoded, three bytes a pixel, row-major.
     ///
     /// # Errors
     /// [`StudyError`] if the file is broken, or differs from the reference in size or kind.
@@ -139,7 +167,11 @@ impl StudyStack {
     /// # Panics
     /// If there is no such level.
     pub fn shown(&self, level: u32) -> Result<Vec<u8>, StudyError> {
-        let path = &self.paths[level as usize];
+        self.shown_frame(level, 0)
+    }
+
+    fn shown_frame(&self, level: u32, frame: u32) -> Result<Vec<u8>, StudyError> {
+        let path = &self.paths[frame as usize][level as usize];
         let picture = read_picture(path)?;
         let want = (self.grid.width(), self.grid.height());
         if picture.size() != want {
@@ -162,12 +194,15 @@ impl StudyStack {
         }
     }
 
-    /// The tiles of a level as PNG files, row-major.
+    /// The tiles of a frame of a level as PNG files, row-major.
     ///
     /// # Errors
     /// Those of [`StudyStack::shown`].
-    pub fn tile_pngs(&self, level: u32) -> Result<Vec<Vec<u8>>, StudyError> {
-        let pixels = self.shown(level)?;
+    ///
+    /// # Panics
+    /// If there is no such level or frame.
+    pub fn tile_pngs(&self, level: u32, frame: u32) -> Result<Vec<Vec<u8>>, StudyError> {
+        let pixels = self.shown_frame(level, frame)?;
         self.grid.tiles().map(|tile| self.png(level, &pixels, tile)).collect()
     }
 
@@ -178,15 +213,44 @@ impl StudyStack {
         PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub)
             .write_image(&cut, tile.width as u32, tile.height as u32, ExtendedColorType::Rgb8)
             .map_err(|e| StudyError::File {
-                path: self.paths[level as usize].clone(),
+                path: self.paths[0][level as usize].clone(),
                 what: e.to_string(),
             })?;
         Ok(png)
     }
 
     pub(crate) fn check_pictures(&self) -> Result<(), StudyError> {
-        (0..self.levels.len()).into_par_iter().try_for_each(|level| self.shown(level as u32).map(drop))
+        let all = (0..self.frames()).flat_map(|frame| (0..=self.last()).map(move |level| (level, frame)));
+        let all: Vec<(u32, u32)> = all.collect();
+        all.into_par_iter().try_for_each(|(level, frame)| self.shown_frame(level, frame).map(drop))
     }
+}
+
+/// Levels and pictures of one folder.
+fn running(folder: &Path) -> Result<(Vec<u64>, Vec<PathBuf>), StudyError> {
+    Ok(running_means(folder)?.into_iter().map(|Frame { last, path, .. }| (last, path)).unzip())
+}
+
+/// The folders of the frames of a loop, in the order of their names.
+fn frames_of(folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
+    let io = |source| StudyError::Io { path: folder.to_owned(), source };
+    let mut frames = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        if path.is_dir() {
+            frames.push(path);
+        }
+    }
+    frames.sort();
+    if !(2..=MAX_FRAMES).contains(&frames.len()) {
+        let what = format!(
+            "{} folders of frames; a loop (a stack with fps) has 2 to {MAX_FRAMES}: 0001, 0002 and so on, each with \
+             pictures of all levels",
+            frames.len()
+        );
+        return Err(StudyError::File { path: folder.to_owned(), what });
+    }
+    Ok(frames)
 }
 
 /// Reads the samples at which each tile stopped from a table with the columns `tile` and `spp`.

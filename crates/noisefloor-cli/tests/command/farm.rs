@@ -270,44 +270,69 @@ fn pipes_and_huge_numbers_hold_nothing_up() {
     assert_eq!(json(&dir.join("frame/report.json"))["complete"], true);
 }
 
-/// Frames of a farm are those of `render --frames`: new noise in each, and the exposure that they are given. Whoever gives
-/// none is warned.
+/// Frames of a farm are those of `render --frames`: new noise in each, and one exposure, which the farm finds in the
+/// first frame, or in those that are named, while the others wait; or which it is given. Whoever lets each frame settle its
+/// own is warned.
 #[test]
 fn a_farm_renders_the_frames_of_a_sequence() {
     let folder = tempdir().unwrap();
     let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/cornell-box.xml");
-    for frame in 1..=2 {
+    for frame in 1..=3 {
         fs::copy(fixture, folder.path().join(format!("hall.{frame}.xml"))).unwrap();
     }
-    let (scene, out, dir) =
-        (folder.path().join("hall.{frame}.xml"), folder.path().join("out"), folder.path().join("farm"));
+    let scene = folder.path().join("hall.{frame}.xml");
     let options = ["--size", "32x32", "--tile", "32", "--batch", "8", "--criterion", "spp:16"];
-    succeed(
-        &[&["render", "--frames", "1-2", text(&scene), "--out", text(&out), "--quiet"], &options[..]]
-            .concat(),
-    );
-    let first = out.join("0001");
+    let render = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let args = ["render", "--frames", "1-3", text(&scene), "--out", text(&out), "--quiet"];
+        succeed(&[&args[..], &options, more].concat());
+        out
+    };
     let plan = |dir: &Path, more: &[&str]| {
-        let args = [&["farm", "plan", text(dir), "--frames", "1-2", "--", text(&scene)], &options[..], more]
-            .concat();
-        let output = command(&args).output().unwrap();
+        let args = [&["farm", "plan", text(dir), "--frames", "1-3", "--", text(&scene)], &options[..], more];
+        let output = command(&args.concat()).output().unwrap();
         assert!(output.status.success(), "{}", stderr(&output));
         stderr(&output)
     };
-    let said = plan(&dir, &["--exposure-from", text(&first)]);
-    assert!(!said.contains("flicker"), "{said}");
-    succeed(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
-    for frame in ["0001", "0002"] {
-        assert_same(&out.join(frame), &dir.join(frame));
-        let [one, other] = [&out, &dir].map(|out| json(&out.join(frame).join("report.json")));
-        assert_eq!((&one["exposure"], &one["seed"]), (&other["exposure"], &other["seed"]));
+    let compare = |one: &Path, farm: &Path| {
+        for frame in ["0001", "0002", "0003"] {
+            assert_same(&one.join(frame), &farm.join(frame));
+            let [one, other] = [one, farm].map(|out| json(&out.join(frame).join("report.json")));
+            assert_eq!((&one["exposure"], &one["seed"]), (&other["exposure"], &other["seed"]), "{frame}");
+        }
+        let picture = |frame: &str| read_exr(farm.join(frame).join("image.exr")).unwrap().pixels;
+        assert!(picture("0001") != picture("0002") && picture("0002") != picture("0003"));
+    };
+    let shown = |dir: &Path| fs::read(dir.join("0002/image.png")).unwrap();
+
+    for (name, more) in
+        [("first", &[][..]), ("third", &["--exposure-from", "3"]), ("eased", &["--exposure-from", "1,3"])]
+    {
+        let (out, dir) = (render(name, more), folder.path().join(format!("farm-{name}")));
+        let said = plan(&dir, more);
+        assert!(!said.contains("flicker"), "{said}");
+        let status = succeed(&["farm", "status", text(&dir)]);
+        assert!(status.contains("0002: waits for"), "{status}");
+        assert!(status.contains("0001: waits for") == (name == "third"), "{status}");
+        // A coordinator that is started again between the rounds, and pictures as far as they are
+        let task = |round: &str, task: &str| run(&["farm", "task", text(&dir), round, task]).status.success();
+        assert!(task("1", "0") && task("1", "1") == (name == "eased"));
+        succeed(&["farm", "merge", text(&dir)]);
+        succeed(&["farm", "run", text(&dir), "--local", "2", "--quiet"]);
+        compare(&out, &dir);
+        assert!(shown(&out) == shown(&dir));
     }
-    assert!(
-        read_exr(dir.join("0001/image.exr")).unwrap().pixels
-            != read_exr(dir.join("0002/image.exr")).unwrap().pixels
-    );
-    let said = plan(&folder.path().join("each"), &["--same-seed"]);
-    assert!(said.contains("the film may flicker") && said.contains("one seed for all frames"), "{said}");
-    let args = ["farm", "plan", "x", "--frames", "1-2", "--", text(&scene), "--exposure-from", "first"];
-    fail(&args, &["by its output folder"]);
+    let (out, dir) = (folder.path().join("first"), folder.path().join("given"));
+    for from in [out.join("0001"), out.clone()] {
+        drop(fs::remove_dir_all(&dir));
+        assert!(!plan(&dir, &["--exposure-from", text(&from)]).contains("flicker"));
+        assert!(!succeed(&["farm", "status", text(&dir)]).contains("waits"));
+        succeed(&["farm", "run", text(&dir), "--local", "1", "--quiet"]);
+    }
+    compare(&out, &dir);
+
+    let said = plan(&folder.path().join("each"), &["--same-seed", "--exposure-from", "each"]);
+    assert!(said.contains("the film flickers") && said.contains("one seed for all frames"), "{said}");
+    let args = ["farm", "plan", "x", "--frames", "1-2", "--", text(&scene), "--exposure-from", "3"];
+    fail(&args, &["frame 3 is not among", "output folder"]);
 }

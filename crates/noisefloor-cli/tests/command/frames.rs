@@ -126,7 +126,103 @@ fn frames_take_their_exposure_from_where_they_are_told() {
     let srgb = ["--exposure-from", "first", "--tone-mapping", "srgb"];
     fail(&[&["render", "--frames", "1-3", text(&scene)], &srgb[..]].concat(), &["--tone-mapping srgb"]);
     fail(&["render", "--exposure-from", "first"], &["--frames"]);
+    fail(&["render", "--exposure-from", "1,2"], &["--frames"]);
     fail(&["render", "--exposure", "2", "--key", "0.2"], &["either --key or --exposure"]);
+}
+
+/// Between several frames, which are rendered first, the exposure is eased by equal factors; a sequence that is taken up
+/// again has the same.
+#[test]
+fn exposure_is_eased_between_frames() {
+    let folder = shots();
+    let (out, shot) = (folder.path().join("out"), folder.path().join("shot.toml"));
+    // The second frame's lamp is four times as bright, and the third's as at first
+    let lamp = folder.path().join("hall.0002.xml");
+    let xml = fs::read_to_string(&lamp).unwrap();
+    let radiance =
+        xml.split("name=\"radiance\" value=\"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+    let bright: Vec<String> =
+        radiance.split(',').map(|c| (4.0 * c.trim().parse::<f64>().unwrap()).to_string()).collect();
+    let two = xml.replacen(&radiance, &bright.join(", "), 1);
+    fs::write(&lamp, &two).unwrap();
+    fs::copy(folder.path().join("hall.0001.xml"), folder.path().join("hall.0004.xml")).unwrap();
+    fs::write(folder.path().join("hall.0004.xml"), &two).unwrap();
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let args =
+        ["render", "--config", text(&shot), "--frames", "1-4", text(&scene), "--out", text(&out), "--quiet"];
+    succeed(&[&args[..], &["--exposure-from", "4,1"]].concat());
+    let exposures = |out: &Path| {
+        [1, 2, 3, 4]
+            .map(|frame| json(&out.join(format!("{frame:04}/report.json")))["exposure"].as_f64().unwrap())
+    };
+    let found = exposures(&out);
+    assert!(found[3] < 0.5 * found[0], "{found:?}");
+    let factor = (found[3] / found[0]).cbrt();
+    for (frame, exposure) in found.iter().enumerate() {
+        let eased = found[0] * factor.powi(frame as i32);
+        assert!((exposure / eased - 1.0).abs() < 1e-5, "frame {}: {exposure}, not {eased}", frame + 1);
+    }
+    let kept = json(&out.join("exposure.json"));
+    assert_eq!(kept[1]["frame"], 4);
+    fs::remove_dir_all(out.join("0002")).unwrap();
+    succeed(&[&args[..], &["--resume"]].concat());
+    assert_eq!(exposures(&out), found);
+    let output = command(&[&args[..], &["--resume", "--exposure-from", "1,2,4"]].concat()).output().unwrap();
+    assert!(stderr(&output).contains("has the exposure of frame 1, 4"), "{}", stderr(&output));
+    // A farm takes one exposure of a render, and a sequence with several has none
+    fail(&["render", "--exposure-from", text(&out)], &["several exposures"]);
+}
+
+/// A forecast renders a few frames of the sequence, says what all take, and loses nothing: the sequence goes on from
+/// them.
+#[test]
+fn a_forecast_renders_frames_that_the_sequence_keeps() {
+    let folder = shots();
+    for frame in 4..=9 {
+        fs::copy(folder.path().join("hall.0001.xml"), folder.path().join(format!("hall.{frame:04}.xml")))
+            .unwrap();
+    }
+    let out = folder.path().join("out");
+    let scene = folder.path().join("hall.{frame:04}.xml");
+    let args =
+        ["render", "--size", "32x32", "--tile", "32", "--max-spp", "4000", "--fps", "24", "--threads", "1"];
+    let args = [&args[..], &["--frames", "1-9", text(&scene), "--out", text(&out)]].concat();
+    let said = succeed(&[&args[..], &["--forecast=3"]].concat());
+    assert!(said.contains("all 9 frames: ") && said.contains("in nine of ten sequences"), "{said}");
+    let few = table(&out);
+    assert_eq!(few.iter().map(|row| row.0).collect::<Vec<_>>(), [1, 5, 9]);
+    let forecast = json(&out.join("forecast.json"));
+    assert_eq!(
+        (&forecast["frames"], &forecast["known"]),
+        (&serde_json::json!([1, 9]), &serde_json::json!([1, 5, 9]))
+    );
+    // Three known frames, and lines between them
+    let spp = [few[0].2, few[1].2, few[2].2];
+    let expected = (spp.iter().sum::<f64>() + 1.5 * (spp[0] + 2.0 * spp[1] + spp[2])) / 9.0;
+    let of = |kind: &str, key: &str| forecast[kind][key].as_f64().unwrap();
+    assert!((of("spp", "expected") / expected - 1.0).abs() < 1e-9, "{forecast} {expected}");
+    for kind in ["spp", "seconds"] {
+        assert!(
+            of(kind, "low") <= of(kind, "expected") && of(kind, "expected") <= of(kind, "high"),
+            "{forecast}"
+        );
+    }
+    // Interrupted, it is taken up
+    fs::remove_dir_all(out.join("0005")).unwrap();
+    let changed =
+        |frame: u32| fs::metadata(out.join(format!("{frame:04}/image.exr"))).unwrap().modified().unwrap();
+    let before = [1, 9].map(changed);
+    succeed(&[&args[..], &["--forecast=3", "--resume", "--quiet"]].concat());
+    assert_eq!(table(&out), few);
+    assert_eq!(json(&out.join("forecast.json"))["spp"], forecast["spp"]);
+    // The rest
+    succeed(&[&args[..], &["--resume", "--quiet"]].concat());
+    let all = table(&out);
+    assert_eq!((all.len(), [1, 9].map(changed)), (9, before));
+    assert_eq!([all[0], all[4], all[8]], [few[0], few[1], few[2]]);
+    fail(&["render", "--forecast"], &["--frames"]);
+    fail(&["render", "--frames", "1-9", text(&scene), "--forecast=2"], &["3…"]);
+    fail(&["farm", "plan", "x", "--frames", "1-9", "--", text(&scene), "--forecast"], &["--frames"]);
 }
 
 /// One seed for all frames is possible, and is warned of; a film is not judged so.

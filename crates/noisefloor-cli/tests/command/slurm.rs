@@ -78,7 +78,7 @@ fn slurm_renders_what_one_machine_renders() {
     sequence(&cluster, &path("sequence"));
 }
 
-/// Two frames that differ by their scenes.
+/// Two frames that differ by their scenes; the second waits for the exposure of the first.
 fn sequence(cluster: &Cluster, dir: &Path) {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/cornell-box.xml");
     let box_ = std::fs::read_to_string(scene).unwrap();
@@ -90,12 +90,14 @@ fn sequence(cluster: &Cluster, dir: &Path) {
     let args = ["farm", "run", text(dir), "--wait", "--every", "0.2"];
     let said = cluster.run(&mut command(&args));
     assert!(said.contains("0005: done") && said.contains("0006: done"), "{said}");
-    for frame in ["5", "6"] {
+    let exposure = json(&dir.join("0005/report.json"))["exposure"].to_string();
+    for (frame, more) in [("5", String::new()), ("6", format!(" --exposure {exposure}"))] {
         let (one, farmed) = (dir.join(format!("one-{frame}")), dir.join(format!("000{frame}")));
         // Each frame has a seed of its own
         let seed = json(&farmed.join("report.json"))["seed"].to_string();
-        let scene = SCENE.replace("cornell-box", text(&xml(frame)));
+        let scene = SCENE.replace("cornell-box", text(&xml(frame))) + &more;
         render(&one, &scene.replace("--seed 5", &format!("--seed {seed}")));
         assert_same(&one, &farmed);
+        assert_eq!(json(&farmed.join("report.json"))["exposure"].to_string(), exposure);
     }
 }

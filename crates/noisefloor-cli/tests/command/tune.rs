@@ -62,6 +62,20 @@ fn samples_that_were_found_are_enough_for_other_seeds() {
     }
 }
 
+/// The frames of a film need fewer samples than a still, whichever way the rate is given; nobody was asked about that.
+#[test]
+fn frames_of_a_film_need_fewer_samples() {
+    let tune = |more: &[&str]| -> f64 { succeed(&[&SMALL[..], more].concat()).trim().parse().unwrap() };
+    let (still, film) = (tune(&[]), tune(&["--fps", "24"]));
+    println!("{still} samples of a still, {film} of a frame");
+    assert!(film < 0.8 * still, "{film} of {still}");
+    assert_eq!(tune(&["--viewing", "desk,fps=24"]), film);
+    let said = succeed(&["tune", "cornell-box", "--size", "64x64", "--fps", "24"]);
+    assert!(said.contains("fps=24") && said.contains("come from stills"), "{said}");
+    fail(&["tune", "--fps", "24", "--viewing", "desk,fps=25"], &["either --fps"]);
+    fail(&["tune", "--fps", "4"], &["10…1000 frames per second"]);
+}
+
 /// A program whose noise is proportional to its threshold, down to a floor.
 #[test]
 fn a_program_s_own_threshold_is_found() {

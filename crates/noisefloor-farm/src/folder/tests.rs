@@ -10,7 +10,7 @@ fn the_state_of_another_job_is_none() {
     let job = |seed: &str| {
         let session = Session::new(40, 20, FixedSpp(8), Params::default()).unwrap();
         let shards = ShardJob::of(SourceIdentity::new(seed), &session);
-        FrameJob { scene: "bulb".into(), source: "ptwne".into(), shards }
+        FrameJob { scene: "bulb".into(), source: "ptwne".into(), shards, waits: false }
     };
     let done = FrameState { done: true, ..FrameState::default() };
     folder.write_frame_job("frame", &job("seed 1")).unwrap();

@@ -62,8 +62,8 @@ struct ClassLine {
 }
 
 /// Writes `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`, `classes.csv`, plots,
-/// `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes. What was there is
-/// replaced.
+/// `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes. Loops are not part of
+/// that: models are trained on stills, and their thresholds are those of films. What was there is replaced.
 ///
 /// # Errors
 /// [`StudyError`] if a file cannot be written, or a picture not be read.
@@ -106,7 +106,9 @@ pub fn write(
         let picture = stack.shown(stack.last())?;
         let grid = plots::grid(stack.grid(), &picture, &tiles, threshold);
         grid.save(dir.join(format!("grid-{}.png", stack.name())))?;
-        pictures(&corpus_dir, study, number)?;
+        if stack.fps().is_none() {
+            pictures(&corpus_dir, study, number)?;
+        }
     }
     corpus(&corpus_dir, study, report, threshold)
 }
@@ -154,7 +156,7 @@ fn corpus(
 ) -> Result<(), StudyError> {
     folder(dir)?;
     let row = |t: &TileRow| {
-        let stack = study.stacks.iter().find(|s| s.name() == t.stack)?;
+        let stack = study.stacks.iter().find(|s| s.name() == t.stack && s.fps().is_none())?;
         let (first_spp, last_spp) = (stack.levels()[0], stack.levels()[stack.last() as usize]);
         let spp = match threshold {
             CorpusThreshold::Level95 => t.level95,

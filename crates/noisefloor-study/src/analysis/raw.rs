@@ -41,6 +41,8 @@ pub struct ResponseRow {
     noise_interval: Option<u32>,
     first_interval_ms: Option<f64>,
     second_interval_ms: Option<f64>,
+    frames_shown: Option<u32>,
+    frames_dropped: Option<u32>,
     pixels_per_degree: Option<f64>,
     distance_mm: Option<f64>,
     gamma: Option<f64>,
@@ -49,7 +51,7 @@ pub struct ResponseRow {
 }
 
 /// Columns of [`ResponseRow`], with what they hold.
-pub const DICTIONARY: [(&str, &str); 23] = [
+pub const DICTIONARY: [(&str, &str); 25] = [
     ("participant", "number of the participant, in the order they began"),
     ("group", "group the participant chose"),
     ("simulated", "whether the observer is simulated"),
@@ -68,6 +70,8 @@ pub const DICTIONARY: [(&str, &str); 23] = [
     ("noise_interval", "forced choice: the noisy interval, 1 or 2"),
     ("first_interval_ms", "forced choice: measured display time of the first interval"),
     ("second_interval_ms", "forced choice: measured display time of the second interval"),
+    ("frames_shown", "loops: frames that were drawn until the answer"),
+    ("frames_dropped", "loops: frames whose time passed before the browser drew them"),
     ("pixels_per_degree", "device pixels per degree of visual angle"),
     ("distance_mm", "distance of the eyes from the screen"),
     ("gamma", "gamma of the screen as matched by the participant"),
@@ -134,6 +138,8 @@ impl ResponseRow {
             noise_interval: None,
             first_interval_ms: None,
             second_interval_ms: None,
+            frames_shown: None,
+            frames_dropped: None,
             pixels_per_degree: conditions.map(|c| c.pixels_per_degree()),
             distance_mm: conditions.map(|c| c.distance_mm),
             gamma: conditions.map(|c| c.gamma),
@@ -182,6 +188,8 @@ impl ResponseRow {
                 (self.onset, self.response_time) = (timing.onset, timing.ms);
                 self.first_interval_ms = timing.intervals.first().copied();
                 self.second_interval_ms = timing.intervals.get(1).copied();
+                self.frames_shown = timing.frames.map(|frames| frames.shown);
+                self.frames_dropped = timing.frames.map(|frames| frames.dropped);
             }
             _ => return false,
         }

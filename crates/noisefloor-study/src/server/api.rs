@@ -136,7 +136,7 @@ pub(crate) async fn erase(
     Ok(StatusCode::NO_CONTENT.into_response())
 }
 
-/// `GET /api/tiles/{stack}/{level}/{tile}`, where the tile ends in `.png`
+/// `GET /api/tiles/{stack}/{level}/{tile}`, where the tile is `5.png`, or `5.2.png` for another frame than the first
 pub(crate) async fn tile(
     State(app): Shared,
     place: Result<Path<(String, String, String)>, PathRejection>,
@@ -146,12 +146,14 @@ pub(crate) async fn tile(
     let Path((stack, level, tile)) = place.map_err(|_| no_tile())?;
     let number = |text: &str| text.parse::<u32>().map_err(|_| no_tile());
     let (stack, level) = (number(&stack)?, number(&level)?);
-    let tile = number(tile.strip_suffix(".png").ok_or_else(no_tile)?)?;
+    let name = tile.strip_suffix(".png").ok_or_else(no_tile)?;
+    let (tile, frame) = name.split_once('.').unwrap_or((name, "0"));
+    let (tile, frame) = (number(tile)?, number(frame)?);
     let shape = app.study.stacks.get(stack as usize).ok_or_else(no_tile)?;
-    if level > shape.last() || tile as usize >= shape.grid().len() {
+    if level > shape.last() || tile as usize >= shape.grid().len() || frame >= shape.frames() {
         return Err(no_tile());
     }
-    let tiles = app.tiles.level((stack, level)).await.map_err(|error| {
+    let tiles = app.tiles.level((stack, level, frame)).await.map_err(|error| {
         eprintln!("error: {error}");
         let do_ = "tell who runs the study: a picture cannot be read";
         Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the picture cannot be shown", "pictures", do_)

@@ -12,7 +12,8 @@ const ROOM: usize = 512 << 20;
 /// Levels that are made at the same time: each needs the memory of its picture.
 const AT_ONCE: usize = 2;
 
-type Key = (u32, u32);
+/// Stack, level and frame.
+type Key = (u32, u32, u32);
 type Tiles = Arc<OnceCell<Arc<Vec<Bytes>>>>;
 
 #[derive(Default)]
@@ -22,7 +23,7 @@ struct Kept {
     bytes: usize,
 }
 
-/// Encoded tiles by stack and level.
+/// Encoded tiles by stack, level and frame.
 pub(crate) struct TileCache {
     study: Arc<Study>,
     kept: Mutex<Kept>,
@@ -48,14 +49,14 @@ impl TileCache {
         Ok(tiles.clone())
     }
 
-    async fn make(&self, (stack, level): Key) -> Result<Arc<Vec<Bytes>>, StudyError> {
+    async fn make(&self, key: Key) -> Result<Arc<Vec<Bytes>>, StudyError> {
         let stopped = || StudyError::Analysis("the server is being stopped".to_owned());
         let _turn = self.makers.acquire().await.map_err(|_| stopped())?;
-        let study = self.study.clone();
-        let work = move || study.stacks[stack as usize].tile_pngs(level);
+        let (study, (stack, level, frame)) = (self.study.clone(), key);
+        let work = move || study.stacks[stack as usize].tile_pngs(level, frame);
         let pngs = tokio::task::spawn_blocking(work).await.map_err(|_| stopped())??;
         let tiles: Vec<Bytes> = pngs.into_iter().map(Bytes::from).collect();
-        self.account((stack, level), tiles.iter().map(Bytes::len).sum());
+        self.account(key, tiles.iter().map(Bytes::len).sum());
         Ok(Arc::new(tiles))
     }
 

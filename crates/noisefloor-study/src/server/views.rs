@@ -55,6 +55,10 @@ pub struct StackView {
     pub tile: usize,
     /// Samples per pixel of each level.
     pub levels: Vec<u64>,
+    /// Frames of a loop; one of a still.
+    pub frames: u32,
+    /// Frames per second of a loop.
+    pub fps: Option<f64>,
 }
 
 impl StackView {
@@ -62,7 +66,8 @@ impl StackView {
     pub fn of(stack: &StudyStack) -> Self {
         let grid = stack.grid();
         let levels = stack.levels().to_vec();
-        Self { width: grid.width(), height: grid.height(), tile: grid.edge(), levels }
+        let (frames, fps) = (stack.frames(), stack.fps());
+        Self { width: grid.width(), height: grid.height(), tile: grid.edge(), levels, frames, fps }
     }
 }
 

@@ -298,7 +298,7 @@ impl ParticipantSession {
     }
 
     fn step(&mut self, tile: u32, level: u32, ms: f64) -> Result<(), EventMisfit> {
-        self.check_time(&TrialTiming { onset: 0, ms, intervals: Vec::new() })?;
+        self.check_time(&TrialTiming { onset: 0, ms, intervals: Vec::new(), frames: None })?;
         let Some(Shown::Acquisition { stack, levels, clicks, .. }) = &mut self.shown else {
             return misfit("this kind of answer does not belong to the protocol of the study");
         };

@@ -262,7 +262,7 @@ fn ln(spp: &[u64], level: u32) -> f64 {
 }
 
 /// A second and a half for everything.
-const TIMING: TrialTiming = TrialTiming { onset: 0, ms: 1500.0, intervals: Vec::new() };
+const TIMING: TrialTiming = TrialTiming { onset: 0, ms: 1500.0, intervals: Vec::new(), frames: None };
 
 /// A screen with 96 pixels per inch at 600 mm, in a dim room.
 const CONDITIONS: Conditions = Conditions {
@@ -293,7 +293,14 @@ mod tests {
             lapse: 0.0,
             bias: 0.0,
         };
-        let stacks = [StackView { width: 16, height: 16, tile: 16, levels: vec![100, 200, 300, 400] }];
+        let stacks = [StackView {
+            width: 16,
+            height: 16,
+            tile: 16,
+            levels: vec![100, 200, 300, 400],
+            frames: 1,
+            fps: None,
+        }];
         let mut observer = public.draw(1);
         let trial =
             Trial::Acquisition { number: 7, practice: false, stack: 0, levels: vec![0], identical: false };

@@ -106,6 +106,8 @@ fn pages_and_tiles_are_served_under_a_strict_policy() {
         "/api/tiles/0/6/0.png",
         "/api/tiles/1/0/0.png",
         "/api/tiles/0/0/2.png",
+        "/api/tiles/0/0/1.1.png",
+        "/api/tiles/0/0/1.x.png",
         "/api/tiles/0/0/0",
         "/api/tiles/-1/0/0.png",
         "/api/tiles/%ff/0/0.png",

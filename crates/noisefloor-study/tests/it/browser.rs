@@ -1,5 +1,5 @@
 use crate::explore::table;
-use crate::kit::{Running, Served, levels, stack};
+use crate::kit::{Running, Served, film, levels, stack};
 use noisefloor::{Oracle, People, descriptor::Descriptor, evidence::Evidence};
 use noisefloor_eyes::Eyes;
 use noisefloor_learn::{Corpora, describe_corpora};
@@ -205,6 +205,28 @@ fn invited_people_use_the_pages_in_a_browser() {
     run("invited.test.mjs", &[("INVITED", &invited), ("STRICT", strict), ("ARABIC", arabic)]);
 }
 
+/// Loops of frames, whose dropped frames are counted: browser/film.test.mjs.
+#[test]
+fn loops_of_frames_play_in_a_browser() {
+    if browser(&[]).is_none() {
+        return;
+    }
+    let studies = ["acquisition", "forced-choice"].map(|protocol| {
+        let dir = tempfile::tempdir().unwrap();
+        film(&dir.path().join("wall"), (128, 64), &levels(5, 4.0), 6);
+        let text = format!(
+            "protocol = \"{protocol}\"\ndatabase = \"answers.sqlite\"\ntile = 64\nrepeats = 1\ntrials = 1\n\
+             interval-ms = 700\n[text.en]\ntitle = \"Film\"\nconsent = \"I take part.\"\n\
+             [[stack]]\nname = \"wall\"\nfolder = \"wall\"\nfps = 24\n[screening]\ncatch = 0\n"
+        );
+        std::fs::write(dir.path().join("study.toml"), text).unwrap();
+        let study = Arc::new(Study::open(dir.path().join("study.toml")).unwrap());
+        (dir, study)
+    });
+    let servers = studies.each_ref().map(|(_, study)| Running::start(study.clone()));
+    run("film.test.mjs", &[("FILM", &servers[0].url), ("FILM_FORCED", &servers[1].url)]);
+}
+
 /// A stack whose last picture's name says nothing, and a picture of another size, on the page of `explore`:
 /// browser/explore.test.mjs.
 #[test]
@@ -316,7 +338,7 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
         lapse: 0.01,
         bias: 0.1,
     };
-    let view = StackView { width: 128, height: 128, tile: 64, levels: levels.clone() };
+    let view = StackView { width: 128, height: 128, tile: 64, levels: levels.clone(), frames: 1, fps: None };
     let views = [view.clone(), view];
     let decisions: Vec<Vec<Vec<Vec<u32>>>> = (0..OBSERVERS)
         .map(|seed| {

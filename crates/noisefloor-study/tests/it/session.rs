@@ -14,7 +14,7 @@ fn conditions() -> Conditions {
 }
 
 fn timing(ms: f64) -> TrialTiming {
-    TrialTiming { onset: 1, ms, intervals: Vec::new() }
+    TrialTiming { onset: 1, ms, intervals: Vec::new(), frames: None }
 }
 
 fn step(trial: u32, tile: u32, level: u32) -> StudyEvent {

@@ -1,5 +1,8 @@
-use crate::kit::{Folder, levels, stack};
+use crate::kit::{Folder, Running, film, levels, stack};
 use noisefloor_image::{RenderLayers, write_exr, write_png};
+use noisefloor_study::analysis::files::write;
+use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse};
+use noisefloor_study::simulated::{Public, SpreadShape, drive};
 use noisefloor_study::{Study, StudyError};
 use std::fs;
 
@@ -78,7 +81,7 @@ fn tiles_hold_the_picture_unchanged() {
     let wall = &study.stacks[0];
     let whole = wall.shown(2).unwrap();
     assert_eq!(wall.grid().len(), 4, "six columns are joined to those beside them");
-    for (tile, png) in wall.grid().tiles().zip(wall.tile_pngs(2).unwrap()) {
+    for (tile, png) in wall.grid().tiles().zip(wall.tile_pngs(2, 0).unwrap()) {
         let path = folder.dir.path().join("tile.png");
         fs::write(&path, &png).unwrap();
         let read = noisefloor_image::read_png(&path).unwrap();
@@ -108,4 +111,80 @@ fn stops_become_levels() {
         let error = Study::open(&folder.file).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
+}
+
+/// A stack with a rate is a loop: a folder of pictures for each frame, all with the same levels, sizes and exposure.
+#[test]
+fn a_stack_may_be_a_loop_of_frames() {
+    let folder = Folder::new("acquisition", &["wall"], &levels(4, 2.0), "");
+    let dir = folder.dir.path().join("wall");
+    let still = folder.study().design();
+    assert!(!still.contains("film"), "{still}");
+    let text = fs::read_to_string(&folder.file).unwrap();
+    let with = |fps: &str| fs::write(&folder.file, text.clone() + &format!("fps = {fps}\n")).unwrap();
+    let refused = |said: &str| {
+        let error = Study::open(&folder.file).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    };
+    with("24");
+    refused("0 folders of frames");
+    fs::remove_dir_all(&dir).unwrap();
+    film(&dir, (64, 32), &levels(4, 2.0), 3);
+    for wrong in ["0", "1000", "nan"] {
+        with(wrong);
+        refused("1 to 240 frames a second");
+    }
+    with("24");
+    let study = folder.study();
+    study.check_pictures().unwrap();
+    let wall = &study.stacks[0];
+    assert_eq!((wall.frames(), wall.fps(), wall.levels().len()), (3, Some(24.0), 4));
+    let [first, second] = [0, 1].map(|frame| wall.tile_pngs(0, frame).unwrap());
+    assert!(first[0] != second[0] && first[1] != second[1]);
+    assert!(study.design().contains("[3,24.0]") && study.design() != still);
+    // A frame that lacks a level, and one of another size
+    fs::rename(dir.join("0003/00020.png"), dir.join("0003/00021.png")).unwrap();
+    refused("whose levels are not those of");
+    fs::rename(dir.join("0003/00021.png"), dir.join("0003/00020.png")).unwrap();
+    stack(&dir.join("0002"), (32, 32), &[20]);
+    assert!(matches!(folder.study().check_pictures(), Err(StudyError::Size { .. })));
+}
+
+/// Simulated observers of a still and of a loop with lower thresholds: the analysis finds both, and the corpus for models
+/// of stills has the still only.
+#[test]
+fn thresholds_of_loops_are_found_and_kept_out_of_the_corpus() {
+    let folder = Folder::new("acquisition", &["wall", "film"], &levels(14, 1.45), "repeats = 2");
+    let dir = folder.dir.path().join("film");
+    fs::remove_dir_all(&dir).unwrap();
+    film(&dir, (64, 32), &levels(14, 1.45), 2);
+    let mut text = fs::read_to_string(&folder.file).unwrap();
+    text += "fps = 24\n[screening]\ncatch = 0\n";
+    fs::write(&folder.file, text).unwrap();
+    let study = folder.study();
+    let server = Running::start(study.clone());
+    let public = Public {
+        thresholds: vec![vec![400.0, 500.0], vec![150.0, 200.0]],
+        shape: SpreadShape::Logistic,
+        between: 0.25,
+        within: 0.1,
+        lapse: 0.0,
+        bias: 0.0,
+    };
+    for seed in 0..12 {
+        drive(&server.url, "", &mut public.draw(seed), |_| ()).unwrap();
+    }
+    let options = AnalysisOptions { keep_excluded: true, seed: 1, simulated: true };
+    let report = analyse(&study, options).unwrap();
+    assert_eq!(report.tiles.len(), 4);
+    for (tile, truth) in report.tiles.iter().zip(public.thresholds.iter().flatten()) {
+        // Twelve observers of scale 0.27 know the median to 0.27·2/√12 = 0.16, times 3
+        let off = (tile.median / truth).ln().abs();
+        assert!(off < 0.48, "{} {}: {} for {truth}", tile.stack, tile.tile, tile.median);
+    }
+    let out = folder.dir.path().join("out");
+    write(&out, &study, &report, CorpusThreshold::Mean).unwrap();
+    let corpus = fs::read_to_string(out.join("corpus-simulated/thresholds.csv")).unwrap();
+    assert!(corpus.contains("wall") && !corpus.contains("film"), "{corpus}");
+    assert!(!out.join("corpus-simulated/film").exists() && out.join("grid-film.png").exists());
 }

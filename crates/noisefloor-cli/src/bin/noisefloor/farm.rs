@@ -3,7 +3,7 @@
 use crate::args::{FarmTask, MergeTask, PlanTask, RunTask};
 use crate::job::{CriterionJob, Ready, RenderJob};
 use crate::output::{self, Output};
-use crate::render::JOB;
+use crate::render::{EACH, JOB, KeyExposure, ONE_SEED, eased, exposure_of};
 use anyhow::{Context, bail};
 use indicatif::HumanDuration;
 use noisefloor::driver::{Clock, Progress};
@@ -90,17 +90,14 @@ fn absolute(dir: &Path) -> anyhow::Result<PathBuf> {
 
 fn plan(PlanTask { dir, frames, tasks, keep, render }: PlanTask) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
-    if let Some(render) = render {
-        if frames.is_some() && render.job.tone.settles() {
-            note!(
-                "warning: each frame settles an exposure of its own, and the film may flicker: render one of them first, \
-                 and give its output folder as --exposure-from, or a number as --exposure"
-            );
+    if let Some((render, exposure)) = render {
+        if frames.is_some() && exposure.frames().is_empty() && render.job.tone.settles() {
+            note!("warning: {EACH}");
         }
         if frames.is_some() && render.job.source.same_seed {
-            note!("warning: {}", crate::render::ONE_SEED);
+            note!("warning: {ONE_SEED}");
         }
-        let plan = FarmPlan::new(render, frames, tasks, keep);
+        let plan = FarmPlan::new(render, frames, tasks, keep).with_first(exposure.frames().to_vec());
         Farm::plan(&here, &absolute(&dir)?, plan)?;
     }
     let round = here.farm(&dir)?.claim()?.next_round()?;
@@ -206,6 +203,22 @@ impl Studio for Here {
 
     fn of_frame(&self, render: &FarmRender, frame: u32) -> FarmRender {
         FarmRender { job: render.job.of_frame(frame), ..render.clone() }
+    }
+
+    /// With the exposure that frame has by those that it waited for.
+    fn after(
+        &self,
+        render: &FarmRender,
+        frame: u32,
+        first: &[(u32, PathBuf)],
+    ) -> Result<FarmRender, StudioError> {
+        let key = |(frame, folder): &(u32, PathBuf)| {
+            anyhow::Ok(KeyExposure { frame: *frame, exposure: exposure_of(folder)? })
+        };
+        let keys: Vec<KeyExposure> = first.iter().map(key).collect::<Result<_, _>>()?;
+        let exposure = eased(&keys, frame).context("the frames that it waits for have no exposure")?;
+        let job = RenderJob { tone: render.job.tone.exposed_as(exposure), ..render.job.clone() };
+        Ok(FarmRender { job, ..render.clone() })
     }
 
     fn open(&self, render: &FarmRender) -> Result<FrameSource, StudioError> {
@@ -354,6 +367,9 @@ fn say_round(round: &Round) -> Result<(), NotSaid> {
 /// One line about a frame.
 fn say_frame(FrameProgress { frame, eta_seconds, state }: &FrameProgress) -> Result<(), NotSaid> {
     let FrameState { tiles, open, samples, sampled, rounds, done, .. } = state;
+    if *tiles == 0 {
+        return say!("{frame}: waits for the frame whose exposure it is to have");
+    }
     if *done {
         let wasted = 100.0 * (sampled.max(samples) - samples) as f64 / (*samples).max(1) as f64;
         return say!("{frame}: done, {samples} samples, {wasted:.1} % more taken than used");

@@ -57,6 +57,8 @@ pub struct Output {
     pub denoised: Option<Denoised>,
     timeline: Vec<TimelineRow>,
     seconds_before: f64,
+    /// Until the first sample, of this run.
+    pub seconds_setup: Option<f64>,
     /// Whether there is an earlier render in the folder, and it is not resumed.
     overwrites: bool,
 }
@@ -97,6 +99,7 @@ impl Output {
             denoised: None,
             timeline,
             seconds_before,
+            seconds_setup: None,
             overwrites,
         })
     }

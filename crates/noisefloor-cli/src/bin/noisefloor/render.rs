@@ -1,6 +1,8 @@
 //! `noisefloor render`.
 
 mod denoised;
+mod exposure;
+mod forecast;
 mod frames;
 mod progress;
 mod saving;
@@ -30,7 +32,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tev::Tev;
 
-pub use frames::{ONE_SEED, SequenceExposure, SequenceRun, exposure_of, one_frame, render_frames};
+pub use exposure::{KeyExposure, SequenceExposure, eased, exposure_of};
+pub use frames::{EACH, ONE_SEED, SequenceRun, one_frame, render_frames};
 pub use progress::reference_bar;
 pub use tev::ADDRESS as TEV_ADDRESS;
 
@@ -111,6 +114,7 @@ fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
     cancel_all_on_signal(flags.into_iter().flatten().collect(), AFTER_THIS_BATCH)?;
     driver.source_mut().watch_reference(reference_bar(*quiet), Arc::clone(&cancel));
     let mut views = Views::open(run, &output, (*width, *height))?;
+    output.seconds_setup = Some(began.elapsed().as_secs_f64());
     let outcome = sample(&mut driver, &mut output, &mut views, keeps, run);
     if let (Ok(()), Some(denoised)) = (&outcome, &output.denoised) {
         // Ended between two verdicts, the denoiser answers: the last picture is denoised, too

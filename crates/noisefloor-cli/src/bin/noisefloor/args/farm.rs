@@ -1,9 +1,9 @@
 //! `noisefloor farm`.
 
-use super::render::RenderArgs;
 use super::{Cli, Command, expand};
 use crate::farm::{self, FarmRender};
 use crate::job::RenderRun;
+use crate::render::SequenceExposure;
 use anyhow::bail;
 use clap::{Args, Subcommand};
 use noisefloor_cli::folder::Earlier;
@@ -86,8 +86,8 @@ struct PlanArgs {
     /// Folder of the farm, on a file system that all machines share.
     dir: PathBuf,
     /// First and last frame. {frame} in the name of the scene, or {frame:04} for four digits, is the number
-    /// of the frame. Each frame has a seed of its own. Give all one exposure: --exposure-from the output folder
-    /// of one that was rendered before, or --exposure.
+    /// of the frame. Each frame has a seed of its own. All have the exposure of the first, for which they wait;
+    /// after `--`, --exposure-from or --exposure give another.
     #[arg(long, value_name = "A-B")]
     frames: Option<FrameRange>,
     /// Most tasks of a round over all frames, up to 1000; short rounds have fewer.
@@ -163,7 +163,7 @@ pub struct PlanTask {
     pub tasks: usize,
     pub keep: bool,
     /// None to plan the next round of what is there.
-    pub render: Option<FarmRender>,
+    pub render: Option<(FarmRender, SequenceExposure)>,
 }
 
 pub struct RunTask {
@@ -188,7 +188,7 @@ impl FarmArgs {
     pub fn check(self) -> anyhow::Result<FarmTask> {
         Ok(match self.command {
             FarmCommand::Plan(PlanArgs { dir, frames, tasks, keep_shards: keep, render }) => {
-                let render = if render.is_empty() { None } else { Some(renders(render, frames.is_some())?) };
+                let render = if render.is_empty() { None } else { Some(renders(render, frames)?) };
                 FarmTask::Plan(Box::new(PlanTask { dir, frames, tasks, keep, render }))
             }
             FarmCommand::Run(RunArgs { dir, local, sbatch, wait, every, quiet }) => {
@@ -210,7 +210,10 @@ impl FarmArgs {
 }
 
 /// The render that follows `--`. Other machines know neither the current folder nor the file of --config.
-fn renders(typed: Vec<OsString>, frames: bool) -> anyhow::Result<FarmRender> {
+fn renders(
+    typed: Vec<OsString>,
+    frames: Option<FrameRange>,
+) -> anyhow::Result<(FarmRender, SequenceExposure)> {
     let words = ["noisefloor".into(), "render".into()].into_iter().chain(typed);
     let cli = Cli::parsed(expand(words.collect())?);
     let cli = cli.map_err(|error| anyhow::anyhow!("after `--`: {error}"))?;
@@ -218,7 +221,18 @@ fn renders(typed: Vec<OsString>, frames: bool) -> anyhow::Result<FarmRender> {
     if args.is_sequence() {
         refuse!("--frames: before `--`, as in `farm plan DIR --frames 1-240 -- 'hall.{{frame:04}}.xml'`");
     }
-    let RenderRun { job, resources, out, time, against, earlier, tev, watch, .. } = RenderArgs::check(*args)?;
+    let (run, exposure) = match frames {
+        Some(frames) => args.check_of(frames)?,
+        None => (args.check()?, SequenceExposure::Each),
+    };
+    let absent = |frame: &&u32| frames.is_some_and(|frames| !frames.contains(**frame));
+    if let Some(frame) = exposure.frames().iter().find(absent) {
+        refuse!(
+            "--exposure-from: frame {frame} is not among the frames of the farm; render it first, and give its output \
+             folder"
+        );
+    }
+    let RenderRun { job, resources, out, time, against, earlier, tev, watch, .. } = run;
     for (option, given) in [
         ("--tev", tev.is_some()),
         ("--watch", watch.is_some()),
@@ -235,8 +249,5 @@ fn renders(typed: Vec<OsString>, frames: bool) -> anyhow::Result<FarmRender> {
         }
     }
     farm::check(&job)?;
-    if frames {
-        job.source.check_frames()?;
-    }
-    FarmRender::new(job.absolute()?, resources)
+    Ok((FarmRender::new(job.absolute()?, resources)?, exposure))
 }

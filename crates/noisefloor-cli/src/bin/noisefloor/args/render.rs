@@ -96,6 +96,19 @@ pub struct RenderArgs {
     /// one exposure (--exposure-from). With --fps, they are judged as frames of a film.
     #[arg(long, value_name = "FIRST-LAST")]
     frames: Option<FrameRange>,
+    /// Render only this many frames of --frames, at equal distances, and say what all of them will take: samples
+    /// per pixel and time, with a range, into forecast.json. The frames are kept: without this option,
+    /// --resume goes on from them [default: 5].
+    #[arg(
+        long,
+        value_name = "FRAMES",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "5",
+        requires = "frames",
+        value_parser = few
+    )]
+    forecast: Option<usize>,
     /// Give all frames the same seed. Their noise then stands still on the screen, like dirt on the lens, and
     /// takes about three times the samples to vanish.
     #[arg(long, conflicts_with = "fps")]
@@ -118,8 +131,9 @@ pub struct RenderArgs {
     #[command(flatten, next_help_heading = "What people see")]
     tone: ToneArgs,
     /// Where Reinhard's operator takes its exposure from, so that a film does not flicker: `first`, the first
-    /// frame that is rendered; the number of another one; the output folder of another render; or `each`, from
-    /// every frame by itself [default: first]. --exposure gives it as a number.
+    /// frame that is rendered; the number of another one, or of several, as in 1,60,120, between which it is
+    /// eased; the output folder of another render; or `each`, from every frame by itself [default: first].
+    /// --exposure gives it as a number.
     #[arg(long, value_name = "WHERE", help_heading = "What people see", conflicts_with = "exposure")]
     exposure_from: Option<ExposureFrom>,
     #[command(flatten, next_help_heading = "What people see")]
@@ -187,7 +201,7 @@ const DRAFT_LOST: f64 = 0.9;
 #[derive(Clone, Debug, PartialEq)]
 enum ExposureFrom {
     First,
-    Frame(u32),
+    Frames(Vec<u32>),
     Render(PathBuf),
     Each,
 }
@@ -196,19 +210,30 @@ impl FromStr for ExposureFrom {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(match (text, text.parse()) {
+        let frames: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+        Ok(match (text, frames) {
             ("first", _) => Self::First,
             ("each", _) => Self::Each,
-            (_, Ok(frame)) => Self::Frame(frame),
+            (_, Ok(mut frames)) => {
+                frames.sort_unstable();
+                frames.dedup();
+                Self::Frames(frames)
+            }
             _ => Self::Render(text.into()),
         })
     }
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+/// Frames per second that the vision model takes.
+pub(super) fn rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().map_err(|_| "expected frames per second, such as 24".to_owned())?;
     Viewing::default().with_frames_per_second(Some(rate)).map_err(|error| error.to_string())?;
     Ok(rate)
+}
+
+/// Fewer frames say nothing about a range.
+fn few(text: &str) -> Result<usize, String> {
+    values::within(text, 3..=1_000_000)
 }
 
 /// As seconds, or 0 for never.
@@ -227,6 +252,17 @@ fn no_spp(text: &str) -> Result<String, String> {
 impl RenderArgs {
     /// A render that can begin.
     pub fn check(self) -> anyhow::Result<RenderRun> {
+        if matches!(self.exposure_from, Some(ExposureFrom::First | ExposureFrom::Frames(_))) {
+            refuse!(
+                "--exposure-from: frames need --frames; a single render takes the exposure of another render, by its \
+                 output folder"
+            );
+        }
+        self.check_one()
+    }
+
+    /// A render, or any frame of a sequence.
+    fn check_one(self) -> anyhow::Result<RenderRun> {
         if cfg!(not(feature = "watch")) && self.look.watch.is_some() {
             refuse!(
                 "this build has no 'render --watch': run `cargo run --release --features watch -- render --watch …`"
@@ -277,13 +313,8 @@ impl RenderArgs {
         if self.exposure_from.is_some() && !tone.settles() {
             refuse!("--exposure-from: --tone-mapping {} has the exposure of --exposure", tone.name());
         }
-        match &self.exposure_from {
-            Some(ExposureFrom::Render(render)) => tone = tone.exposed_as(exposure_of(render)?),
-            Some(ExposureFrom::First | ExposureFrom::Frame(_)) if self.frames.is_none() => refuse!(
-                "--exposure-from: frames need --frames; a single render, or a farm, takes the exposure of another \
-                 render, by its output folder"
-            ),
-            _ => {}
+        if let Some(ExposureFrom::Render(render)) = &self.exposure_from {
+            tone = tone.exposed_as(exposure_of(render)?);
         }
         let hosts = self.look.allow_host;
         Ok(RenderRun {
@@ -305,20 +336,30 @@ impl RenderArgs {
         self.frames.is_some()
     }
 
+    /// A render of which these are frames, and where their exposure comes from.
+    pub fn check_of(self, frames: FrameRange) -> anyhow::Result<(RenderRun, SequenceExposure)> {
+        let from = self.exposure_from.clone().unwrap_or(ExposureFrom::First);
+        let typed = self.exposure_from.is_some();
+        let run = self.check_one()?;
+        run.job.source.check_frames()?;
+        let exposure = match from {
+            ExposureFrom::First if run.job.tone.settles() => {
+                SequenceExposure::Of(vec![frames.first()], typed)
+            }
+            ExposureFrom::Frames(frames) => SequenceExposure::Of(frames, typed),
+            _ => SequenceExposure::Each,
+        };
+        Ok((run, exposure))
+    }
+
     /// Frames that can begin.
     pub fn check_frames(self) -> anyhow::Result<SequenceRun> {
         let Some(frames) = self.frames else { refuse!("--frames is missing") };
-        let from = self.exposure_from.clone().unwrap_or(ExposureFrom::First);
-        let typed = self.exposure_from.is_some();
-        let run = self.check()?;
-        let exposure = match from {
-            ExposureFrom::First if run.job.tone.settles() => SequenceExposure::Of(frames.first(), typed),
-            ExposureFrom::Frame(frame) if run.job.tone.settles() => SequenceExposure::Of(frame, typed),
-            _ => SequenceExposure::Each,
-        };
+        let forecast = self.forecast;
+        let (run, exposure) = self.check_of(frames)?;
         let before = run.job.source.check_frames()?;
         let out = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(stem(&before)), PathBuf::from);
-        Ok(SequenceRun { frames, out, run, exposure })
+        Ok(SequenceRun { frames, out, run, exposure, forecast })
     }
 }
 

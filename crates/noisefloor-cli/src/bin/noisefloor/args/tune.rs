@@ -1,5 +1,6 @@
 //! `noisefloor tune`.
 
+use super::render::rate;
 use crate::tune::{KnobChoice, TuneCriterion, TuneJob};
 use clap::Args;
 use noisefloor::Audience;
@@ -11,7 +12,7 @@ use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::renderer::RendererArgs;
 use noisefloor_cli::options::tone::ToneArgs;
 use noisefloor_cli::options::values;
-use noisefloor_cli::options::viewing::ViewingArgs;
+use noisefloor_cli::options::viewing::{ViewingArgs, judged_by};
 use noisefloor_cli::refuse;
 use noisefloor_cli::sources::SourceKind;
 use noisefloor_denoise::DEFAULT_JODS_LOST;
@@ -36,6 +37,7 @@ use std::path::PathBuf;
   noisefloor tune shot.blend --source cycles                  Cycles' noise threshold
   noisefloor tune shot.blend --source cycles --denoise oidn   for a picture that will be denoised
   noisefloor tune shot.blend --source cycles --tone-mapping lut:agx.cube --lut-input log2:-10,6.5
+  noisefloor tune shot.blend --source cycles --fps 24         for the frames of a film
   noisefloor tune hall/scene.xml --source mitsuba             samples per pixel
   noisefloor tune 'walk.{frame:04}.xml' --frames 1,50,120     one setting for a sequence
   noisefloor tune --source 'command: myrender {scene} --noise {threshold} --seed {seed} -o {out}.exr' hall.ass
@@ -91,6 +93,10 @@ pub struct TuneArgs {
     tone: ToneArgs,
     #[command(flatten, next_help_heading = "What people see")]
     viewing: ViewingArgs,
+    /// Find the setting for the frames of a film of so many frames per second, each with new noise: fewer samples,
+    /// or a coarser threshold, by the vision model. Nobody has been asked about films.
+    #[arg(long, value_name = "RATE", value_parser = rate, help_heading = "What people see")]
+    fps: Option<f64>,
     #[command(flatten, next_help_heading = "What people see")]
     eyes: EyesArgs,
 }
@@ -170,6 +176,16 @@ impl TuneArgs {
             };
             (TuneCriterion::Noise(Box::new(oracle)), viewing, audience)
         };
+        if viewing.frames_per_second().is_some() && self.fps.is_some() {
+            refuse!("give either --fps or the fps of --viewing, not both");
+        }
+        let viewing = match self.fps {
+            Some(_) => viewing.with_frames_per_second(self.fps)?,
+            None => viewing,
+        };
+        if let TuneCriterion::Noise(oracle) = &criterion {
+            judged_by(Some(viewing), oracle)?;
+        }
         Ok(TuneJob {
             source,
             frames: self.frames,

@@ -65,6 +65,8 @@ pub(super) struct Report<'a> {
     reference_worst: Option<f32>,
     /// Of the runs that this one resumes (`--resume`); the others are this run's.
     seconds_before: f64,
+    /// Before the first sample: to read the scene, and to prepare it. Not part of the total.
+    seconds_setup: Option<f64>,
     seconds_source: Option<f64>,
     seconds_oracle: Option<f64>,
     seconds_total: Option<f64>,
@@ -123,6 +125,7 @@ impl<'a> Report<'a> {
             reference_deviation: noise.map(|n| n.deviation()),
             reference_worst: noise.map(|n| n.worst()),
             seconds_before: output.seconds_before,
+            seconds_setup: output.seconds_setup,
             seconds_source: clock.map(|c| c.source_seconds),
             seconds_oracle: clock.map(|c| c.criterion_seconds),
             seconds_total: clock.map(|c| c.total_seconds),

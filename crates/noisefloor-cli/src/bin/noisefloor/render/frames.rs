@@ -2,10 +2,11 @@
 //!
 //! A frame that fails or is killed takes nothing else with it, and memory is that of one frame.
 
+use super::exposure::{self, KeyExposure, SequenceExposure, eased};
+use super::forecast;
 use crate::job::{CriterionJob, RenderRun};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use indicatif::HumanDuration;
-use noisefloor_cli::files::write_json;
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::signals::{self, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::{note, say};
@@ -13,7 +14,7 @@ use noisefloor_farm::FrameRange;
 use noisefloor_image::write_csv;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
-use std::io::{BufReader, ErrorKind, Write};
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -26,69 +27,21 @@ pub struct SequenceRun {
     pub out: PathBuf,
     pub run: RenderRun,
     pub exposure: SequenceExposure,
+    /// How many frames are rendered to say what all of them take; none to render all.
+    pub forecast: Option<usize>,
 }
-
-/// What exposure frames have, where it hangs on the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SequenceExposure {
-    /// Each what it settles on, or all a given one.
-    Each,
-    /// All that of one frame; whether the user has named it.
-    Of(u32, bool),
-}
-
-/// exposure.json: what a sequence keeps, so that frames which are rendered later, or elsewhere, have the same.
-#[derive(Serialize, Deserialize)]
-struct KeptExposure {
-    /// Whose it is.
-    frame: u32,
-    exposure: f32,
-}
-
-const KEPT: &str = "exposure.json";
 
 impl SequenceRun {
-    /// The run of one frame, in a folder of its own; with a given exposure, unless it is the one whose exposure all have.
-    fn of_frame(&self, frame: u32, given: Option<&KeptExposure>) -> RenderRun {
+    /// The run of one frame, in a folder of its own; with the exposure that it has by the key frames, unless it is one
+    /// of them.
+    fn of_frame(&self, frame: u32, keys: &[KeyExposure]) -> RenderRun {
         let out = self.out.join(FrameRange::folder(frame));
         let against = self.run.against.as_ref().map(|against| against.of_frame(frame));
         let mut job = self.run.job.of_frame(frame);
-        if let Some(kept) = given.filter(|kept| kept.frame != frame) {
-            job.tone = job.tone.exposed_as(kept.exposure);
+        if let Some(exposure) = eased(keys, frame) {
+            job.tone = job.tone.exposed_as(exposure);
         }
         RenderRun { job, out: Some(out.into()), against, ..self.run.clone() }
-    }
-}
-
-impl SequenceRun {
-    /// The exposure that frames in the output folder have already.
-    fn kept_exposure(&self) -> anyhow::Result<Option<KeptExposure>> {
-        let path = self.out.join(KEPT);
-        let SequenceExposure::Of(frame, typed) = self.exposure else { return Ok(None) };
-        if self.run.earlier == Earlier::Overwrite {
-            return match fs::remove_file(&path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => {
-                    Err(error).context(path.display().to_string())
-                }
-                _ => Ok(None),
-            };
-        }
-        let file = match File::open(&path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(error).context(path.display().to_string()),
-        };
-        let kept: KeptExposure =
-            serde_json::from_reader(BufReader::new(file)).with_context(|| path.display().to_string())?;
-        if typed && kept.frame != frame {
-            bail!(
-                "{} has the exposure of frame {}, which the frames that are there have: leave out --exposure-from, or \
-                 render all frames again with --force",
-                path.display(),
-                kept.frame
-            );
-        }
-        Ok(Some(kept))
     }
 }
 
@@ -106,42 +59,34 @@ pub fn one_frame() -> anyhow::Result<ExitCode> {
 
 /// One line of frames.csv.
 #[derive(Serialize)]
-struct FrameRow {
-    frame: u32,
+pub(super) struct FrameRow {
+    pub(super) frame: u32,
     /// Whether every tile has what it should have.
     complete: bool,
     /// Samples per pixel, on average.
-    spp: f64,
-    seconds: f64,
+    pub(super) spp: f64,
+    /// With reading the scene, without writing files.
+    pub(super) seconds: f64,
     unfamiliar_tiles: usize,
 }
 
 /// What report.json says.
 #[derive(Deserialize)]
-struct FrameReport {
+pub(super) struct FrameReport {
     complete: bool,
     width: usize,
     height: usize,
     samples: u64,
     unfamiliar_tiles: usize,
     seconds_before: f64,
+    #[serde(default)]
+    seconds_setup: Option<f64>,
     seconds_total: Option<f64>,
-    exposure: Option<f32>,
-}
-
-/// The exposure of the render in this folder.
-pub fn exposure_of(folder: &Path) -> anyhow::Result<f32> {
-    let said = || format!("--exposure-from {}", folder.display());
-    let report =
-        read(folder).with_context(said).context("no report.json of a render is there, or it is damaged")?;
-    report
-        .exposure
-        .with_context(said)
-        .context("that render has no exposure yet: let it come to its first verdict")
+    pub(super) exposure: Option<f32>,
 }
 
 pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
-    let SequenceRun { frames, out, run, exposure } = sequence;
+    let SequenceRun { frames, out, run, exposure, forecast } = sequence;
     let (first, last) = (frames.first(), frames.last());
     fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     // Ctrl-C reaches the process of the frame, too, which then writes what there is
@@ -149,26 +94,28 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
     cancel_on_signal(Arc::clone(&cancel), "stopping after this frame")?;
     warn(sequence);
     let (began, mut rows, mut rendered) = (Instant::now(), Vec::new(), 0);
-    let mut given = sequence.kept_exposure()?;
-    // The frame whose exposure all have comes first
-    let reference = match *exposure {
-        SequenceExposure::Of(frame, _) if given.is_none() => Some(frame),
-        _ => None,
+    let mut keys = exposure.kept(out, run.earlier)?;
+    // The frames whose exposures the others have come first
+    let key_frames = if keys.is_empty() { exposure.frames() } else { &[] };
+    let wanted: Vec<u32> = match forecast {
+        Some(few) => frames.spread(*few),
+        None => frames.iter().collect(),
     };
-    let others = frames.iter().filter(|frame| Some(*frame) != reference);
-    for frame in reference.into_iter().chain(others) {
+    let others: Vec<u32> = wanted.into_iter().filter(|frame| !key_frames.contains(frame)).collect();
+    let keys_within = key_frames.iter().filter(|frame| frames.contains(**frame)).count();
+    let mut found = Vec::new();
+    for (index, &frame) in key_frames.iter().chain(&others).enumerate() {
         let folder = out.join(FrameRange::folder(frame));
         // Whether that is this frame, its own process knows: it reads the scene
         let done = run.earlier == Earlier::Resume && read(&folder).is_some_and(|report| report.complete);
-        let status =
-            elsewhere(&sequence.of_frame(frame, given.as_ref())).with_context(|| format!("frame {frame}"))?;
+        let status = elsewhere(&sequence.of_frame(frame, &keys)).with_context(|| format!("frame {frame}"))?;
         rendered += u32::from(!done);
         if !status.success() && status.code() != Some(INTERRUPTED.into()) {
             note!("frame {frame} of {first} to {last} failed; --resume goes on from it");
             return Ok(ExitCode::from(status.code().and_then(|code| code.try_into().ok()).unwrap_or(1)));
         }
         let report = read(&folder);
-        if frames.iter().any(|one| one == frame) {
+        if frames.contains(frame) {
             rows.extend(report.as_ref().map(|report| row(frame, report)));
             rows.sort_by_key(|row| row.frame);
             write_csv(out.join("frames.csv"), &rows)?;
@@ -177,27 +124,31 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
             note!("stopped at frame {frame} of {first} to {last}; --resume goes on from it");
             return Ok(ExitCode::from(INTERRUPTED));
         }
-        if Some(frame) == reference {
+        if index < key_frames.len() {
             let exposure = report.and_then(|report| report.exposure);
             let exposure = exposure.with_context(|| {
                 format!(
-                    "frame {frame} ended before its exposure was known, which all frames are to have: give it more \
+                    "frame {frame} ended before its exposure was known, which other frames are to have: give it more \
                      --time, or give --exposure"
                 )
             })?;
-            let kept = KeptExposure { frame, exposure };
-            write_json(&out.join(KEPT), &kept)?;
-            given = Some(kept);
+            found.push(KeyExposure { frame, exposure });
+            if found.len() == key_frames.len() {
+                exposure::keep(out, &found)?;
+                keys.clone_from(&found);
+            }
         }
-        let to_go = frames.iter().count().saturating_sub(rows.len());
+        let to_go = (keys_within + others.len()).saturating_sub(rows.len());
         if !run.quiet && !done && to_go > 0 {
             let left = began.elapsed().as_secs_f64() / f64::from(rendered) * to_go as f64;
             let left = HumanDuration(Duration::from_secs_f64(left));
             note!("frame {frame} of {first} to {last} done, about {left} to go");
         }
     }
-    if !run.quiet {
-        sum_up(out, &rows)?;
+    match forecast {
+        Some(_) => forecast::say(*frames, out, &rows, run.quiet)?,
+        None if !run.quiet => sum_up(out, &rows)?,
+        None => {}
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -205,6 +156,10 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
 /// What is unwise about one seed for all frames.
 pub const ONE_SEED: &str = "with one seed for all frames, their noise stands still on the screen, like dirt on the lens: it takes about three \
      times the samples to vanish. Leave out --same-seed";
+
+/// What is unwise about an exposure for each frame.
+pub const EACH: &str = "each frame settles an exposure of its own. Those of frames that differ by noise alone differ by several percent, \
+     and the film flickers: leave out --exposure-from each";
 
 /// Says what is unwise about a sequence.
 fn warn(sequence: &SequenceRun) {
@@ -222,11 +177,8 @@ fn warn(sequence: &SequenceRun) {
              the samples or less: --fps 24"
         );
     }
-    if sequence.exposure == SequenceExposure::Each && job.tone.settles() {
-        note!(
-            "warning: each frame settles an exposure of its own. Those of frames that differ by noise alone differ by \
-             several percent, and the film flickers: leave out --exposure-from each"
-        );
+    if sequence.exposure.frames().is_empty() && job.tone.settles() {
+        note!("warning: {EACH}");
     }
 }
 
@@ -244,13 +196,14 @@ fn elsewhere(run: &RenderRun) -> anyhow::Result<ExitStatus> {
     Ok(ended?)
 }
 
-fn read(out: &Path) -> Option<FrameReport> {
+pub(super) fn read(out: &Path) -> Option<FrameReport> {
     serde_json::from_reader(BufReader::new(File::open(out.join("report.json")).ok()?)).ok()
 }
 
 fn row(frame: u32, report: &FrameReport) -> FrameRow {
     let spp = report.samples as f64 / (report.width * report.height).max(1) as f64;
-    let seconds = report.seconds_before + report.seconds_total.unwrap_or(0.0);
+    let this_run = report.seconds_setup.unwrap_or(0.0) + report.seconds_total.unwrap_or(0.0);
+    let seconds = report.seconds_before + this_run;
     let FrameReport { complete, unfamiliar_tiles, .. } = *report;
     FrameRow { frame, complete, spp, seconds, unfamiliar_tiles }
 }

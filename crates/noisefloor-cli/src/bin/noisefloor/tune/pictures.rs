@@ -229,13 +229,19 @@ impl<'a> Judges<'a> {
 
     /// What the verdict is about, in words.
     pub fn said(&self) -> String {
+        let viewing = &self.params.viewing;
+        let film = viewing.frames_per_second().map(|rate| format!(", as a frame of {rate} a second"));
+        let film = film.unwrap_or_default();
         match (self.criterion, &self.denoiser) {
             (TuneCriterion::Denoised { lost }, Some(denoiser)) => format!(
-                "at most {lost} JOD lost after {}, by the vision model: nobody has been asked",
+                "at most {lost} JOD lost after {}{film}, by the vision model: nobody has been asked",
                 denoiser.name()
             ),
+            (TuneCriterion::Noise(oracle), _) if !film.is_empty() => {
+                format!("for {} of people, {viewing}; people's thresholds come from stills", oracle.people())
+            }
             (TuneCriterion::Noise(oracle), _) => {
-                format!("for {} of people, {}", oracle.people(), self.params.viewing)
+                format!("for {} of people, {viewing}", oracle.people())
             }
             (TuneCriterion::Denoised { lost }, None) => format!("at most {lost} JOD lost"),
         }
