@@ -220,6 +220,35 @@ pub fn spp_without_denoising(
     Some(samples?.iter().sum::<f64>() / (grid.width() * grid.height()) as f64)
 }
 
+/// Samples per pixel, on average, after which the *denoised* picture would have lost no more than `limit` JODs in any
+/// tile, estimated from a film that was sampled for the noisy one, and so without albedo and normals. It takes the
+/// error of its many samples for what would be left of that of far fewer, so it is rough: a factor of two is well
+/// possible. `None` if that is out of sight for a tile.
+///
+/// # Errors
+/// [`DenoiseError`] if the denoiser fails.
+pub fn spp_with_denoising(
+    film: &Film,
+    display: &Display,
+    mut denoiser: impl Denoiser,
+    viewing: Viewing,
+    limit: f64,
+) -> Result<Option<f64>, DenoiseError> {
+    let (grid, model) = (film.grid(), VisionModel::new(&viewing));
+    let size = (grid.width(), grid.height());
+    let [a, b] = film_halves(film);
+    let [da, db] = denoiser.denoise_both([&a, &b].map(|half| NoisyPicture::new(size, half)).each_ref())?;
+    let error = DenoisedError::new(&DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] }, display)?;
+    let tiles: Vec<Tile> = grid.tiles().collect();
+    let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
+        let mut eyes = Eyes { model: &model, room };
+        let spp = eyes.needed(&error.part(tile), limit, (film.spp(tile.index), DENOISED_DECAY))?;
+        Some(spp as f64 * tile.pixels() as f64)
+    });
+    let samples: Option<Vec<f64>> = samples.collect();
+    Ok(samples.map(|samples| samples.iter().sum::<f64>() / (size.0 * size.1) as f64))
+}
+
 /// The noise of a tile of the film, as displayed.
 fn noise_of(film: &Film, display: &Display, tile: Tile) -> Vec<f32> {
     let planes = TilePlanes::from_halves(film, display, tile);

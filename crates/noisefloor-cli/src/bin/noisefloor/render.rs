@@ -129,6 +129,9 @@ fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
     written?;
     if !quiet {
         output.summarise(driver.session(), driver.clock(), driver.source().as_ref())?;
+        if matches!(job.criterion, CriterionJob::Oracle { .. }) && driver.session().is_done() {
+            denoised::say_what_it_would_save(driver.session(), began.elapsed())?;
+        }
     }
     let stopped = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
     Ok(if stopped || interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })

@@ -1,13 +1,23 @@
 //! `render --denoise`: a criterion and the denoiser that it shares with the output.
 
 use crate::output::Denoised;
-use noisefloor::{ProgressiveSource, SourceError, StoppingCriterion, source::FirstHits};
+use noisefloor::{ProgressiveSource, Session, SourceError, StoppingCriterion, source::FirstHits};
+use noisefloor_cli::say::say;
 use noisefloor_cli::sources::FIRST_HITS_SPP;
-use noisefloor_denoise::{AuxiliaryPictures, DenoisedQuality, Denoiser, Oidn};
+use noisefloor_denoise::{
+    AuxiliaryPictures, DEFAULT_JODS_LOST, DenoisedQuality, Denoiser, Oidn, spp_with_denoising,
+};
 use noisefloor_sidecar::FilterPlan;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+
+/// Renders below this say nothing of what denoising would have saved.
+const LONG: Duration = Duration::from_secs(30);
+/// The first verdict on denoised halves, in samples per pixel.
+const FIRST_DENOISED: u64 = 48;
+/// What is saved must be more than the estimate may be wrong by.
+const WORTH_SAYING: f64 = 2.0;
 
 /// Starts the denoiser. A tile may lose so many JODs, and a call may take so long.
 pub(super) fn begin(
@@ -26,6 +36,26 @@ pub(super) fn begin(
     }
     let denoised = Denoised::new(denoiser, guides.as_deref(), criterion.record(), give_up, lost);
     Ok((Box::new(criterion), denoised))
+}
+
+/// Says what a render whose noise was judged would have taken with a denoiser, if one is installed. The answer costs a
+/// second or two, so nobody gets it who has waited for less than [`LONG`].
+pub(super) fn say_what_it_would_save(session: &Session, took: Duration) -> anyhow::Result<()> {
+    let Some(display) = session.display().filter(|_| took >= LONG) else { return Ok(()) };
+    let plan = FilterPlan { timeout: LONG, ..FilterPlan::default() };
+    // Whoever has none has not asked for one
+    let Ok(denoiser) = Oidn::start(plan) else { return Ok(()) };
+    let (film, viewing) = (session.film(), session.params().viewing);
+    let Ok(Some(spp)) = spp_with_denoising(film, display, denoiser, viewing, DEFAULT_JODS_LOST) else {
+        return Ok(());
+    };
+    let pixels = film.grid().width() * film.grid().height();
+    let spp = spp.max(FIRST_DENOISED as f64);
+    let times = film.total_samples() as f64 / pixels as f64 / spp;
+    if times > WORTH_SAYING {
+        say!("--denoise oidn would have taken about {spp:.0} samples per pixel, {times:.1} times fewer")?;
+    }
+    Ok(())
 }
 
 /// Albedo and normals for each half, if the denoiser makes use of them and the source has them.
