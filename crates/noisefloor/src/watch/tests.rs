@@ -387,9 +387,9 @@ fn right_samples_are_silent() {
 }
 
 #[test]
-#[ignore = "for measuring how often chance alone says something: a minute"]
-fn right_samples_are_silent_in_22500_sessions() {
-    right_ones_are_silent(1500);
+#[ignore = "for measuring how often chance alone says something: minutes"]
+fn right_samples_are_silent_in_37500_sessions() {
+    right_ones_are_silent(2500);
 }
 
 fn right_ones_are_silent(seeds: u64) {
