@@ -111,7 +111,8 @@ fn resume(session: &NfSession, job: &str, from: impl Read) -> Result<(), Failure
     let checkpoint = Checkpoint::read(from)?;
     let mut locked = session.lock()?;
     let grid = locked.film().grid();
-    let mut fresh = Session::new(grid.width(), grid.height(), locked.criterion().clone(), *locked.params())?;
+    let mut fresh =
+        Session::new(grid.width(), grid.height(), locked.criterion().clone(), locked.params().clone())?;
     fresh.set_pixels(locked.pixels());
     *locked = fresh.resume(job, checkpoint)?;
     Ok(())

@@ -337,7 +337,7 @@ impl PySession {
         let (oracle, params) = self
             .detached(py, |session| {
                 session.checkpoint(PICKLED)?.write(&mut kept)?;
-                Ok((PyOracle(session.criterion().clone()), PyParams(*session.params())))
+                Ok((PyOracle(session.criterion().clone()), PyParams(session.params().clone())))
             })?
             .map_err(|error: CheckpointError| error.raise())?;
         let shared_pixels = self.pixels == PixelNoise::Shared;
@@ -383,7 +383,8 @@ fn resume(session: &mut Session<Oracle>, pixels: PixelNoise, path: &Path, job: &
     let file = File::open(path).map_err(|error| file_error(path, &error))?;
     let checkpoint = Checkpoint::read(BufReader::new(file)).map_err(|error| raise(path, error))?;
     let grid = session.film().grid();
-    let fresh = fresh((grid.width(), grid.height()), session.criterion().clone(), *session.params(), pixels)?;
+    let fresh =
+        fresh((grid.width(), grid.height()), session.criterion().clone(), session.params().clone(), pixels)?;
     *session = fresh.resume(job, checkpoint).map_err(|error| raise(path, error))?;
     Ok(())
 }

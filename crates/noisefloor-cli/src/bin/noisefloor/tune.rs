@@ -88,7 +88,8 @@ pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
     end_on_signal("stopped; what was found so far stands above")?;
     let keep = job.keep.take().map(|folder| Keep::claim(folder, job.earlier)).transpose()?;
     let began = Instant::now();
-    let mut params = Params::default().with_viewing(job.viewing).with_tone_mapping(job.tone).with_tile(TILE);
+    let mut params =
+        Params::default().with_viewing(job.viewing).with_tone_mapping(job.tone.clone()).with_tile(TILE);
     params.audience = job.audience;
     let mut pictures = Pictures::open(&job.source, job.resources, job.tuning.knob(), job.most_spp)?;
     let mut judges = Judges::begin(&job.criterion, params, &mut pictures, job.resources.timeout)?;
