@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 /// A function from exposed linear radiance to display values.
 type Map = dyn Fn(Rgb) -> Rgb + Send + Sync;
 
-/// The functions of all curves that there are, by the digest of their identity: one that is read from a file has its
-/// function if this program holds the curve.
+/// The functions of all curves that there are, by the digest of their identity: one that is read from a file
+/// has its function if this program holds the curve.
 static CURVES: Mutex<BTreeMap<[u8; 32], Weak<Map>>> = Mutex::new(BTreeMap::new());
 
 fn curves() -> MutexGuard<'static, BTreeMap<[u8; 32], Weak<Map>>> {
@@ -19,8 +19,8 @@ fn curves() -> MutexGuard<'static, BTreeMap<[u8; 32], Weak<Map>>> {
 
 /// A tone mapping of the caller's own, for [`crate::ToneMapping::Custom`]: a filmic curve, a LUT, a closure.
 ///
-/// Files keep its digest, because a function cannot be written down. Make the curve again before you read one, and
-/// hold it meanwhile: a digest without a curve is an error, so that no curve is without its function.
+/// Files keep its digest, because a function cannot be written down. Make the curve again before you read one,
+/// and hold it meanwhile: a digest without a curve is an error, so that no curve is without its function.
 ///
 /// ```
 /// use noisefloor::{Params, ToneMapping, display::ToneCurve};
