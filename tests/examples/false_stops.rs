@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .with_max_spp(MOST);
             let (mut tiles, mut samples, mut stopped) = (0, 0, Vec::new());
             for seed in 0..seeds {
-                let mut driver = Driver::new(source(scene, seed)?, Oracle::bundled(), params)?;
+                let mut driver = Driver::new(source(scene, seed)?, Oracle::bundled(), params.clone())?;
                 driver.run(|_, _| ())?;
                 let session = driver.session();
                 let (image, display) = (session.film().image(), session.display().ok_or("no display")?);

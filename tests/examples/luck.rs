@@ -112,7 +112,7 @@ fn stop(source: Rare, params: Params) -> Result<(u64, bool, f64), Box<dyn Error>
     driver.run(|_, _| ())?;
     let (source, session) = driver.into_parts();
     let samples = session.stops().next().ok_or("no stop")?.spp;
-    let display: Display = *session.display().ok_or("no display")?;
+    let display: Display = session.display().ok_or("no display")?.clone();
     let (image, edge) = (session.film().image(), source.edge);
     let error = ndarray::Array2::from_shape_fn((edge, edge), |(y, x)| {
         let truth: Rgb = [source.truth(0, x, y); 3];
@@ -162,7 +162,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     let mut runs = Vec::new();
                     for seed in 0..seeds {
                         let source = Rare { edge, place, chance, seed: seed * 0x1_0000_0001 + 1, found: 0 };
-                        runs.push(stop(source, params)?);
+                        runs.push(stop(source, params.clone())?);
                     }
                     let missed = runs.iter().filter(|run| !run.1).count();
                     let median = |mut values: Vec<f64>, place: f64| {

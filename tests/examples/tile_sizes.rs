@@ -47,7 +47,7 @@ fn measure(name: &str) -> Result<(), Box<dyn Error>> {
     let mut at_128: Vec<f64> = Vec::new();
     for tile in TILES {
         let session = render(name, 1, Oracle::bundled(), tile, MOST)?;
-        let display = *session.display().ok_or("no verdict was given")?;
+        let display = session.display().ok_or("no verdict was given")?.clone();
         let mut spp = vec![0.0; EDGE * EDGE];
         for Stop { tile, .. } in session.stops() {
             let samples = session.film().spp(tile.index) as f64;

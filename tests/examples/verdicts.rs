@@ -22,8 +22,8 @@ const MOST: u64 = 600;
 /// What is compared: a name, and what is set.
 fn rules() -> Vec<(&'static str, Params)> {
     let params = Params::default().with_tile(TILE).with_max_spp(MOST).with_min_spp(0);
-    let every = |step| params.with_schedule(Schedule::Every { step });
-    let fine = |min_spp, consecutive| params.with_min_spp(min_spp).with_consecutive(consecutive);
+    let every = |step| params.clone().with_schedule(Schedule::Every { step });
+    let fine = |min_spp, consecutive| params.clone().with_min_spp(min_spp).with_consecutive(consecutive);
     vec![
         ("every 100", every(100)),
         ("every 8", every(8)),
@@ -143,7 +143,7 @@ fn watch(
         onlooker.judge()?;
         for session in &mut sessions {
             if let (None, Some(display)) = (session.display(), onlooker.display()) {
-                session.set_display(*display)?;
+                session.set_display(display.clone())?;
             }
             session.judge()?;
         }

@@ -93,7 +93,7 @@ impl DenoisedError {
         add_common([&mut residual, &mut standing], [plane(2), plane(3)]);
         let light = |i: usize| Light::new(noisy.map(|p| p[i]), denoised.map(|p| p[i]));
         let light = (0..noisy[0].len()).map(light).collect();
-        Ok(Self { size, shown: plane(0).values, residual, standing, light, display: *display })
+        Ok(Self { size, shown: plane(0).values, residual, standing, light, display: display.clone() })
     }
 
     /// The error of a picture whose truth is known, in the same form: for comparison. In a film, all of it is taken
@@ -114,7 +114,7 @@ impl DenoisedError {
         let shown: Vec<f32> = truth.iter().map(|&p| display.luma(p)).collect();
         let residual = picture.iter().zip(&shown).map(|(&p, truth)| display.luma(p) - truth).collect();
         let light = picture.iter().zip(truth).map(|(&p, &t)| Light::new([t; 2], [p; 2])).collect();
-        Ok(Self { size, shown, residual, standing: Vec::new(), light, display: *display })
+        Ok(Self { size, shown, residual, standing: Vec::new(), light, display: display.clone() })
     }
 
     /// Width and height in pixels.
@@ -203,12 +203,19 @@ impl DenoisedError {
         let (shown, residual) = (crop(&self.shown), crop(&self.residual));
         let standing = if self.standing.is_empty() { Vec::new() } else { crop(&self.standing) };
         let light = pixels().filter_map(|pixel| self.light.get(pixel).copied()).collect();
-        Self { size: (tile.width, tile.height), shown, residual, standing, light, display: self.display }
+        Self {
+            size: (tile.width, tile.height),
+            shown,
+            residual,
+            standing,
+            light,
+            display: self.display.clone(),
+        }
     }
 
     /// A picture as displayed with this wrong with it, whose brightness is not in question.
     pub(crate) fn of(size: (usize, usize), shown: Vec<f32>, residual: Vec<f32>, display: &Display) -> Self {
-        Self { size, shown, residual, standing: Vec::new(), light: Vec::new(), display: *display }
+        Self { size, shown, residual, standing: Vec::new(), light: Vec::new(), display: display.clone() }
     }
 
     /// A map of just-objectionable differences lost, row-major.

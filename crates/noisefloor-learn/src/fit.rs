@@ -220,7 +220,7 @@ pub(crate) fn parts(
         spread: spread(table, &classifier),
         descriptor: table.descriptor.clone(),
         evidence: table.evidence,
-        tone_mapping: table.tone_mapping,
+        tone_mapping: table.tone_mapping.clone(),
         viewing: table.viewing,
         classifier,
         familiarity,

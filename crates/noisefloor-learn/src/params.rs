@@ -17,8 +17,8 @@ const WEIGHED: [&str; 3] = ["visible_noise", "picture_noise", "picture_light"];
 pub enum Learner {
     /// A support vector machine, on examples that are noisy or converged (Takouachet et al. 2017, §5).
     Svm,
-    /// Logistic regression on the share of observers who see no difference: it decides on a straight line. C is
-    /// how little its weights are penalised; γ has no effect.
+    /// Logistic regression on the share of observers who see no difference: it decides on a straight line. C
+    /// is how little its weights are penalised; γ has no effect.
     Line,
 }
 

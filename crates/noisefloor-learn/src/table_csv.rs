@@ -50,7 +50,7 @@ pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> 
         descriptor: table.descriptor.spec(),
         descriptor_version: table.descriptor.version(),
         evidence: table.evidence,
-        tone_mapping: table.tone_mapping,
+        tone_mapping: table.tone_mapping.clone(),
         viewing: table.viewing,
     };
     let head = serde_json::to_string(&head).map_err(std::io::Error::from).map_err(csv::Error::from)?;

@@ -88,7 +88,7 @@ impl PyViewing {
 ///
 /// Raises ParameterError if a value is out of range.
 #[pyclass(frozen, eq, name = "Params", module = "noisefloor", from_py_object)]
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct PyParams(pub(crate) Params);
 
 /// A Viewing, or its text.
@@ -229,24 +229,24 @@ impl PyParams {
         let params = &self.0;
         let arguments = PyDict::new(py);
         arguments.set_item("tile", params.tile)?;
-        match params.tone_mapping {
+        match &params.tone_mapping {
             ToneMapping::Reinhard { key, white } => {
                 arguments.set_item("tone_mapping", "reinhard")?;
-                arguments.set_item("key", short(key))?;
+                arguments.set_item("key", short(*key))?;
                 arguments.set_item("white", white.map(short))?;
             }
             ToneMapping::ReinhardAt { exposure, white } => {
                 arguments.set_item("tone_mapping", "reinhard")?;
-                arguments.set_item("exposure", short(exposure))?;
+                arguments.set_item("exposure", short(*exposure))?;
                 arguments.set_item("white", white.map(short))?;
             }
             ToneMapping::Srgb { exposure } => {
                 arguments.set_item("tone_mapping", "srgb")?;
-                arguments.set_item("exposure", short(exposure))?;
+                arguments.set_item("exposure", short(*exposure))?;
             }
             ToneMapping::Custom { exposure, curve } => {
                 arguments.set_item("tone_mapping", PyToneTable::of(curve))?;
-                arguments.set_item("exposure", short(exposure))?;
+                arguments.set_item("exposure", short(*exposure))?;
             }
         }
         arguments.set_item("viewing", params.viewing.to_string())?;

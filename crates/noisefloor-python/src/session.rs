@@ -389,7 +389,7 @@ impl PySession {
         let checkpoint = py.detach(|| Checkpoint::read(BufReader::new(file)));
         let checkpoint = checkpoint.map_err(|error| raise(&path, error))?;
         let mut guard = self.attached(py)?;
-        let judged = fresh(py, self.size(), &self.judging, *guard.params(), self.pixels)?;
+        let judged = fresh(py, self.size(), &self.judging, guard.params().clone(), self.pixels)?;
         let session = judged.session.resume(job, checkpoint).map_err(|error| raise(&path, error))?;
         *guard.0 = Judged { session, ..judged };
         Ok(())
@@ -424,7 +424,7 @@ impl PySession {
         let params = self
             .detached(py, |session| {
                 session.checkpoint(PICKLED)?.write(&mut kept)?;
-                Ok(PyParams(*session.params()))
+                Ok(PyParams(session.params().clone()))
             })?
             .map_err(|error: CheckpointError| error.raise())?;
         let (size, judging) = (self.size(), self.judging.to_python(py, self.size())?);

@@ -136,7 +136,7 @@ fn judge_still(
     samples: Option<Samples>,
 ) -> PyResult<PyJudged> {
     let evidence = oracle.model().evidence();
-    let pair = SnapshotPair::new(evidence, image, &[other], params.tone_mapping, samples);
+    let pair = SnapshotPair::new(evidence, image, &[other], params.tone_mapping.clone(), samples);
     let pair = pair.map_err(Raise::raise)?.seen_on(params.viewing);
     let grid = TileGrid::new(image.size.0, image.size.1, params.tile).map_err(Raise::raise)?;
     let described = pair.describe(oracle, grid).map_err(Raise::raise)?;

@@ -45,9 +45,9 @@ fn raise(error: ToneTableError) -> PyErr {
 
 impl PyToneTable {
     /// The table of a curve that this module has made; None if it has not.
-    pub(crate) fn of(curve: ToneCurve) -> Option<Self> {
+    pub(crate) fn of(curve: &ToneCurve) -> Option<Self> {
         let tables = TABLES.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(Self { curve, table: Arc::clone(tables.get(&curve.digest())?) })
+        Some(Self { curve: curve.clone(), table: Arc::clone(tables.get(&curve.digest())?) })
     }
 }
 
@@ -74,7 +74,7 @@ impl PyToneTable {
         let table = Arc::new(ToneTable::new(edge, toe, top, values).map_err(raise)?);
         let curve = ToneTable::clone(&table).into_tone_curve();
         let mut tables = TABLES.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(Self { curve, table: Arc::clone(tables.entry(curve.digest()).or_insert(table)) })
+        Ok(Self { curve: curve.clone(), table: Arc::clone(tables.entry(curve.digest()).or_insert(table)) })
     }
 
     /// radiances(n, toe=0.001, top=1000.0) --

@@ -9,8 +9,6 @@ use rayon::prelude::*;
 
 /// Default of [`CyclesAdaptive::threshold`]: Blender's.
 pub(crate) const DEFAULT_THRESHOLD: f64 = 0.01;
-/// Smallest automatic threshold.
-const LEAST_AUTOMATIC: f64 = 0.001;
 /// Keeps black pixels from dividing by zero.
 const EPSILON: f64 = 1e-4;
 
@@ -38,12 +36,6 @@ impl CyclesAdaptive {
     /// The criterion with this constant, and 95 % of a tile's pixels.
     pub fn new(threshold: f64) -> Self {
         Self { threshold, share: DEFAULT_SHARE, converged: Vec::new() }
-    }
-
-    /// The threshold that Cycles chooses by itself for renders of at most `max_spp`: 1/`max_spp`, at least
-    /// 0.001.
-    pub fn automatic(max_spp: u64) -> Self {
-        Self::new((1.0 / max_spp.max(1) as f64).max(LEAST_AUTOMATIC))
     }
 
     /// Samples per pixel before which no pixel converges, as Cycles chooses them: 16/threshold^0.3, rounded
@@ -166,11 +158,9 @@ mod tests {
     }
 
     #[test]
-    fn automatic_numbers_are_those_of_cycles() {
+    fn fewest_samples_are_those_of_cycles() {
         let least = [0.1, 0.01, 0.001].map(|t| CyclesAdaptive::new(t).min_spp());
         assert_eq!(least, [32, 64, 128]);
-        let automatic = [50, 1000, 100_000].map(|n| CyclesAdaptive::automatic(n).threshold);
-        assert_eq!(automatic, [0.02, 0.001, 0.001]);
     }
 
     /// A film of grey but for one pixel, at (32, 10), on the border of tiles 0 and 1.

@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("--tile 64", true, Params::default().with_tile(64)),
         ("without halves", false, Params::default()),
     ];
-    println!("| scene | {} | converged |", options.map(|(name, ..)| name).join(" | "));
+    println!("| scene | {} | converged |", options.clone().map(|(name, ..)| name).join(" | "));
     println!("|---|{}---|", "---|".repeat(options.len()));
     for name in names {
         let scene = Arc::new(match scenes::by_name(name) {
@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         });
         let mut cells = Vec::new();
         let converged = converged(&scene, size, spp)?;
-        for (option, halves, params) in options {
+        for (option, halves, params) in options.clone() {
             let seed = if option == "seed 2" { 2 } else { 1 };
             let (exposure, at) = first_stop(source(&scene, size, seed)?, Hasty { halves }, params)?;
             cells.push(format!("{:+.1} % ({at})", 100.0 * (exposure / converged - 1.0)));

@@ -1,9 +1,9 @@
 //! Mitsuba XML, versions 0.5 to 3.
 //!
 //! `markup` splits text into tags, `document` makes a tree of the files, with includes and parameters
-//! resolved; `context` follows references, reads numbers, points and transforms, and notes what nobody has read,
-//! which becomes warnings. Each part of a scene has a module. The README lists what is read. Errors of shapes and
-//! emitters are collected, so that one load names all.
+//! resolved; `context` follows references, reads numbers, points and transforms, and notes what nobody has
+//! read, which becomes warnings. Each part of a scene has a module. The README lists what is read. Errors of
+//! shapes and emitters are collected, so that one load names all.
 
 mod bsdfs;
 mod colours;

@@ -6,8 +6,8 @@
 
 mod agreement;
 pub mod files;
-pub mod fit;
-pub mod interval;
+mod fit;
+mod interval;
 pub mod observers;
 mod plots;
 pub mod raw;

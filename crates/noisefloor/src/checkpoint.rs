@@ -148,8 +148,8 @@ impl Checkpoint<'_> {
             source: Cow::Borrowed(&self.source),
             criterion: Cow::Borrowed(&self.criterion),
             state: Cow::Borrowed(&self.state),
-            params: self.params,
-            display: self.display,
+            params: self.params.clone(),
+            display: self.display.clone(),
             settling: self.settling,
             film: self.film.head(),
             tiles: Cow::Borrowed(&self.tiles),
@@ -210,13 +210,13 @@ fn changed_param(kept: &Params, now: &Params) -> Option<(&'static str, String, S
     let words = |params: &Params| {
         // A new parameter does not compile until it is here
         let Params { tile, tone_mapping, viewing, schedule, min_spp, max_spp, consecutive, audience } =
-            *params;
+            params;
         let Audience { slope, offset } = audience;
         [
             ("tile edge", format!("{tile} pixels")),
             ("audience", format!("one of {slope} times the samples {offset:+}")),
             ("viewing", viewing.to_string()),
-            ("schedule", schedule_in_words(schedule)),
+            ("schedule", schedule_in_words(*schedule)),
             ("fewest samples per pixel", min_spp.to_string()),
             ("most samples per pixel", max_spp.to_string()),
             ("number of verdicts in a row", consecutive.to_string()),

@@ -33,7 +33,7 @@ pub fn luminance([r, g, b]: Rgb) -> f32 {
 }
 
 /// How a picture is to be displayed, before its exposure is known.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ToneMapping {
     /// The photographic operator, global form (Reinhard et al. 2002, eqs. 1–4).
@@ -141,6 +141,7 @@ impl ToneMapping {
     pub(crate) fn settle_by(&self, log_average: impl FnOnce() -> Option<LogAverage>) -> Settled {
         let known = |exposure, curve| Settled { display: Display { exposure, curve }, error: 0.0 };
         match *self {
+            Self::Custom { exposure, ref curve } => known(exposure, Curve::Custom(curve.clone())),
             Self::Reinhard { key, white } => {
                 let curve = Curve::Reinhard { white };
                 let Some(LogAverage { value, error }) = log_average() else { return known(1.0, curve) };
@@ -148,13 +149,12 @@ impl ToneMapping {
             }
             Self::ReinhardAt { exposure, white } => known(exposure, Curve::Reinhard { white }),
             Self::Srgb { exposure } => known(exposure, Curve::Clamp),
-            Self::Custom { exposure, curve } => known(exposure, Curve::Custom(curve)),
         }
     }
 }
 
 /// A display, and how well its exposure is known.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Settled {
     /// The display.
@@ -176,7 +176,7 @@ fn log_average(pixels: &[Rgb]) -> Option<f64> {
     geometric_mean(DELTA * geometric_mean(0.0)?)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Curve {
     Clamp,
     Reinhard { white: Option<f32> },
@@ -186,8 +186,8 @@ enum Curve {
 impl Curve {
     /// b and c of L_d = L·(1 + b·L)/(1 + c·L), the same for every pixel.
     #[inline(always)]
-    fn terms(self) -> (f32, f32) {
-        match self {
+    fn terms(&self) -> (f32, f32) {
+        match *self {
             Self::Clamp | Self::Custom(_) => (0.0, 0.0),
             // A white point near 0 makes all white but black.
             Self::Reinhard { white } => (white.map_or(0.0, |w| (1.0 / (w * w)).min(f32::MAX)), 1.0),
@@ -205,7 +205,7 @@ impl Curve {
 /// let shown = display.luma([0.5; 3]);
 /// assert!((shown - 0.427).abs() < 1e-3, "{shown}");
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Display {
     exposure: f32,
     curve: Curve,
@@ -223,7 +223,7 @@ impl Display {
     /// Linear radiance → linear display values in [0, 1]. Negative radiance shows as black.
     #[inline(always)]
     pub fn map(&self, pixel: Rgb) -> Rgb {
-        match self.curve {
+        match &self.curve {
             Curve::Custom(curve) => curve.show(self.expose(pixel)).map(srgb_decode),
             _ => self.map_plain(pixel),
         }
@@ -250,7 +250,7 @@ impl Display {
     /// Linear radiance → display-encoded sRGB in [0, 1].
     #[inline(always)]
     pub fn encode(&self, pixel: Rgb) -> Rgb {
-        match self.curve {
+        match &self.curve {
             Curve::Custom(curve) => curve.show(self.expose(pixel)),
             _ => self.encode_plain(pixel),
         }
@@ -311,7 +311,7 @@ mod tests {
     #[test]
     fn a_curve_of_the_caller_s_own_shows_what_it_says() {
         let curve = ToneCurve::new(b"root", |exposed| exposed.map(f32::sqrt));
-        let tone = ToneMapping::Custom { exposure: 4.0, curve };
+        let tone = ToneMapping::Custom { exposure: 4.0, curve: curve.clone() };
         assert_eq!(tone.check(), Ok(()));
         let display = tone.settle(&[[7.0; 3]]);
         // √(4·0.0625) = ½ on the screen, and 1 from 0.25
@@ -395,12 +395,12 @@ mod tests {
         for curve in curves.into_iter().chain([Curve::Clamp]) {
             for exposure in [1e-30, 1.0, 1e30] {
                 for value in [-0.0, 1e-45, f32::MIN_POSITIVE, f32::MAX, -f32::MAX, -1.0] {
-                    let shown = Display { exposure, curve }.luma([value; 3]);
+                    let shown = Display { exposure, curve: curve.clone() }.luma([value; 3]);
                     assert!((0.0..=1.0 + 1e-6).contains(&shown), "{curve:?}, {exposure}, {value}: {shown}");
                     assert!(value > 0.0 || shown == 0.0, "{curve:?}, {exposure}, {value}: {shown}");
                 }
                 // Red stays red
-                let red = Display { exposure, curve }.encode([1.0, 0.0, 0.0]);
+                let red = Display { exposure, curve: curve.clone() }.encode([1.0, 0.0, 0.0]);
                 assert_eq!((red[1], red[2]), (0.0, 0.0), "{curve:?}, {exposure}");
             }
         }

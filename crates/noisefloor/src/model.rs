@@ -294,7 +294,7 @@ impl Model {
             descriptor: descriptor.spec(),
             descriptor_version: descriptor.version(),
             evidence: *evidence,
-            tone_mapping: *tone_mapping,
+            tone_mapping: tone_mapping.clone(),
             viewing: (*viewing).into(),
             classifier: Cow::Borrowed(classifier),
             familiarity: Cow::Borrowed(familiarity),
@@ -326,7 +326,7 @@ impl Model {
 
     /// How the training pictures were displayed.
     pub fn tone_mapping(&self) -> ToneMapping {
-        self.0.tone_mapping
+        self.0.tone_mapping.clone()
     }
 
     /// The viewing conditions that it was trained for. Those of the bundled model are an assumption (`desk`):

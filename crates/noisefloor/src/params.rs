@@ -137,7 +137,7 @@ impl Audience {
 /// let params = noisefloor::Params::default().with_tile(64).with_max_spp(4000);
 /// assert_eq!((params.tile, params.min_spp, params.max_spp), (64, 16, 4000));
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Params {
     /// Tile edge in pixels, 16…512; see [`crate::TileGrid`] for the last column and row. A tile stops as a
@@ -330,12 +330,14 @@ mod tests {
     fn ranges_are_checked() {
         let ok = Params::default();
         assert_eq!(ok.check(), Ok(()));
-        assert!(Params { schedule: Schedule::Every { step: 1 }, ..ok }.check().is_err());
-        assert!(Params { max_spp: 15, ..ok }.check().is_err());
-        assert!(Params { max_spp: 1, min_spp: 0, ..ok }.check().is_err());
-        assert!(Params { consecutive: 0, ..ok }.check().is_err());
-        assert!(Params { audience: Audience { slope: f64::NAN, offset: 0.0 }, ..ok }.check().is_err());
-        assert!(Params { tone_mapping: ToneMapping::Srgb { exposure: 0.0 }, ..ok }.check().is_err());
+        assert!(Params { schedule: Schedule::Every { step: 1 }, ..ok.clone() }.check().is_err());
+        assert!(Params { max_spp: 15, ..ok.clone() }.check().is_err());
+        assert!(Params { max_spp: 1, min_spp: 0, ..ok.clone() }.check().is_err());
+        assert!(Params { consecutive: 0, ..ok.clone() }.check().is_err());
+        assert!(
+            Params { audience: Audience { slope: f64::NAN, offset: 0.0 }, ..ok.clone() }.check().is_err()
+        );
+        assert!(Params { tone_mapping: ToneMapping::Srgb { exposure: 0.0 }, ..ok.clone() }.check().is_err());
     }
 
     proptest! {

@@ -118,7 +118,7 @@ impl<C: StoppingCriterion> Session<C> {
         let tile = TileState { goal, verdict: None, stop: None };
         let tiles = vec![tile; grid.len()];
         // Only an exposure by log-average depends on the picture, and has to wait for one
-        let display = match params.tone_mapping {
+        let display = match &params.tone_mapping {
             ToneMapping::Reinhard { .. } => None,
             known => Some(known.settle(&[])),
         };
@@ -160,7 +160,8 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// How the picture is to be shown so far: [`Session::display`], or as it would be settled now.
     pub fn display_so_far(&self) -> Display {
-        self.display.unwrap_or_else(|| self.film.settle(&self.params.tone_mapping).display)
+        let settled = || self.film.settle(&self.params.tone_mapping).display;
+        self.display.clone().unwrap_or_else(settled)
     }
 
     /// Fixes how radiance is displayed before that is settled automatically: for renderers with an exposure
@@ -305,7 +306,7 @@ impl<C: StoppingCriterion> Session<C> {
         if due.is_empty() {
             return Ok(Vec::new());
         }
-        let before = (self.display, self.settling);
+        let before = (self.display.clone(), self.settling);
         let Some(moved) = self.settle_display() else { return Ok(Vec::new()) };
         self.watch.look(&self.film)?;
         let (first, doubts) = (self.params.first_verdict(), self.watch.doubts());
@@ -386,7 +387,7 @@ impl<C: StoppingCriterion> Session<C> {
     /// `None` if it is too early.
     fn settle_display(&mut self) -> Option<bool> {
         let samples = self.film.total_samples();
-        let due = match (self.display, self.settling) {
+        let due = match (&self.display, self.settling) {
             (Some(_), None) => false,
             (Some(_), Some(settling)) => settling.is_due(samples),
             (None, _) => {
@@ -402,7 +403,7 @@ impl<C: StoppingCriterion> Session<C> {
         if due {
             let Settled { display, error, .. } = self.film.settle(&self.params.tone_mapping);
             self.settling = Some(Settling { samples, error });
-            if self.display.is_none_or(|before| is_another(&before, &display)) {
+            if self.display.as_ref().is_none_or(|before| is_another(before, &display)) {
                 moved = self.display.is_some();
                 self.display = Some(display);
                 self.displayed_reference = None;

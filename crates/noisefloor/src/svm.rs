@@ -1,4 +1,4 @@
-//! What decides, a line or a support vector machine, and how sure it is. In f32 and without allocation; the crate
+//! What decides, a line or a support vector machine, and how sure it is. In f32 and without allocation;
 //! `noisefloor-learn` trains both.
 
 use serde::{Deserialize, Serialize};

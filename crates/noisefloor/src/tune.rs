@@ -241,7 +241,8 @@ impl PicturePair {
     pub fn compare(&self, params: &Params) -> Result<SnapshotPair<'_>, StillError> {
         let halves = [&self.one];
         let nested = Some(Samples::Nested);
-        let pair = SnapshotPair::new(Evidence::Halves, &self.mean, &halves, params.tone_mapping, nested)?;
+        let tone = params.tone_mapping.clone();
+        let pair = SnapshotPair::new(Evidence::Halves, &self.mean, &halves, tone, nested)?;
         Ok(pair.seen_on(params.viewing))
     }
 

@@ -31,7 +31,7 @@ fn tiles_of(tile: usize) -> Params {
 #[test]
 fn the_unit_of_radiance_changes_nothing() {
     let often = tiles_of(32).with_schedule(Schedule::Every { step: 20 }).with_min_spp(20);
-    let at = |brightness: f32| run(Synthetic { brightness, ..Synthetic::new(96, 48) }, often).stops;
+    let at = |brightness: f32| run(Synthetic { brightness, ..Synthetic::new(96, 48) }, often.clone()).stops;
     let usual = at(1.0);
     assert!(usual.iter().any(|s| s.spp > 20), "no noise to judge: {usual:?}");
     for unit in [1e-30, 1e-8, 1e-4, 1e4, 1e8, 1e30] {

@@ -120,8 +120,8 @@ fn a_lut_is_a_tone_mapping() {
     };
     let curve = |text: &str, input| parse_cube(text.as_bytes()).unwrap().into_tone_curve(input);
     let one = curve(&text("one"), LutInput::Linear);
-    let tone = ToneMapping::Custom { exposure: 2.0, curve: one };
-    assert!(Params::default().with_tone_mapping(tone).check().is_ok());
+    let tone = ToneMapping::Custom { exposure: 2.0, curve: one.clone() };
+    assert!(Params::default().with_tone_mapping(tone.clone()).check().is_ok());
     let (lut, srgb) = (tone.settle(&[]), ToneMapping::Srgb { exposure: 2.0 }.settle(&[]));
     for value in [0.0, 0.001, 0.1, 0.3, 0.49, 0.7] {
         let (a, b) = (lut.luma([value; 3]), srgb.luma([value; 3]));

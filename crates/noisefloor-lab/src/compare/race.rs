@@ -46,7 +46,7 @@ impl Entrant {
         params: &Params,
     ) -> Result<Self, LabError> {
         let family = spec.split(':').next().unwrap_or_default().to_owned();
-        let session = Session::new(width, height, criterion, *params)?;
+        let session = Session::new(width, height, criterion, params.clone())?;
         let apart = matches!(params.schedule, Schedule::Spaced { .. });
         Ok(Self { spec, family, session, apart, own_seconds: 0.0, criterion_seconds: 0.0 })
     }
@@ -234,7 +234,7 @@ impl Course<'_> {
     /// All judge by one way to the screen: that of the converged picture.
     fn settle(&self, field: &mut Field) -> Result<Yardstick, LabError> {
         let display = self.params.tone_mapping.settle(self.truth);
-        field.entrants.iter_mut().try_for_each(|e| e.session.set_display(display))?;
+        field.entrants.iter_mut().try_for_each(|e| e.session.set_display(display.clone()))?;
         let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision: self.vision.clone() };
         Yardstick::new(field.film.grid(), display, self.truth.to_vec(), eye)
     }

@@ -6,8 +6,8 @@ use noisefloor::descriptor::{Descriptor, DescriptorError, NoiseMask, TileDescrip
 use noisefloor::evidence::TilePlanes;
 use std::collections::BTreeMap;
 
-/// What the paper ends with: the noise mask of the tile and of what it is compared with, pixel by pixel (§5). 2·edge²
-/// numbers, for tiles of exactly edge×edge pixels.
+/// What the paper ends with: the noise mask of the tile and of what it is compared with, pixel by pixel (§5).
+/// 2·edge² numbers, for tiles of exactly edge×edge pixels.
 pub(super) fn mask_pair(mask: NoiseMask, edge: usize) -> Descriptor {
     Descriptor::new(PixelPair { mask: Some(mask), edge })
 }

@@ -195,8 +195,8 @@ mod tests {
         (rows, labels)
     }
 
-    /// The solver on a kernel matrix takes the steps that linfa's takes: the same support vectors and weights, but for
-    /// rounding, 2⁻²⁴ of them in f32.
+    /// The solver on a kernel matrix takes the steps that linfa's takes: the same support vectors and weights,
+    /// but for rounding, 2⁻²⁴ of them in f32.
     #[test]
     fn weights_equal_linfa_s() {
         for (dimensions, c, gamma) in [
@@ -219,7 +219,8 @@ mod tests {
         }
     }
 
-    /// What a matrix product saves: `cargo test --release -p noisefloor-lab long_rows -- --ignored --nocapture`.
+    /// What a matrix product saves:
+    /// `cargo test --release -p noisefloor-lab long_rows -- --ignored --nocapture`.
     #[test]
     #[ignore = "measures time"]
     fn long_rows() {

@@ -106,29 +106,29 @@ impl Hypothesis {
 
 /// An estimate with the interval that holds 95 % of the posterior.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub(super) struct Estimate {
     /// Posterior median.
-    pub value: f64,
+    pub(super) value: f64,
     /// 2.5 % and 97.5 % of the posterior.
-    pub interval: [f64; 2],
+    pub(super) interval: [f64; 2],
 }
 
 /// The spread of the thresholds of one tile.
 #[derive(Clone, Debug)]
-pub struct ThresholdFit {
+pub(super) struct ThresholdFit {
     /// ln(spp) at which half of the observers see no difference.
-    pub median: Estimate,
+    pub(super) median: Estimate,
     /// ln(spp) at which 95 % see none.
-    pub level95: Estimate,
+    pub(super) level95: Estimate,
     /// Distance between the quartiles of the best hypothesis, in ln(spp).
-    pub width: f64,
+    pub(super) width: f64,
     best: Hypothesis,
 }
 
 impl ThresholdFit {
     /// Fits observations, each with a weight above 0; `None` without any. Weights below 1 say that
     /// observations repeat each other, as showings to one observer do.
-    pub fn new(observations: &[(Observation, f64)]) -> Option<Self> {
+    pub(super) fn new(observations: &[(Observation, f64)]) -> Option<Self> {
         let weight: f64 = observations.iter().map(|(_, w)| w).sum();
         if weight <= 0.0 || !weight.is_finite() {
             return None;
@@ -159,14 +159,14 @@ impl ThresholdFit {
     }
 
     /// Share of observers who see no difference at this many samples per pixel, of the best hypothesis.
-    pub fn share(&self, spp: f64) -> f64 {
+    pub(super) fn share(&self, spp: f64) -> f64 {
         self.best.share(spp.ln())
     }
 
     /// Probability of stops at least as unlike the best hypothesis as these, if it were true (Pearson's χ²
     /// over cells of five expected stops, divided by `design`, the factor by which repeated showings raise
     /// it). `None` for fewer than five cells.
-    pub fn fit_probability(&self, stops: &[u32], spp: &[u64], design: f64) -> Option<f64> {
+    pub(super) fn fit_probability(&self, stops: &[u32], spp: &[u64], design: f64) -> Option<f64> {
         let n = stops.len() as f64;
         let ln = |level: usize| (spp[level].max(1) as f64).ln();
         let slip = self.best.slips / spp.len() as f64;

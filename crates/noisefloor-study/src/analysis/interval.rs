@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 /// Two-sided normal quantile of a 95 % interval.
 const Z: f64 = 1.959_963_984_540_054;
 /// Number of bootstrap resamples.
-pub const RESAMPLES: usize = 1000;
+pub(super) const RESAMPLES: usize = 1000;
 
 /// A share of answers with its 95 % interval (Wilson 1927; Brown, Cai and DasGupta 2001, eq. 4).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -41,7 +41,7 @@ impl Share {
 /// the bootstrap", §14.3, without acceleration) and moved out by Student's t and n/(n−1), since those of
 /// few observers are too narrow (Hesterberg 2015, "What teachers should know about the bootstrap", §3.3).
 /// `None` for fewer than two observers, or if no drawing has finite values.
-pub fn bootstrap<const N: usize>(
+pub(super) fn bootstrap<const N: usize>(
     observers: usize,
     seed: u64,
     found: [f64; N],

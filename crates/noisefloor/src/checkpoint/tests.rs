@@ -140,7 +140,7 @@ fn run_for<C: StoppingCriterion>(driver: &mut Driver<Habitual, C>, batches: usiz
 /// For every batch k, a checkpoint at k equals none: samples, stops, warnings and faults.
 fn a_checkpoint_equals_none<C: StoppingCriterion>(criterion: impl Fn() -> C, habit: Habit) -> Vec<String> {
     let params = Params { tile: 16, max_spp: 96, ..Params::default() };
-    let new = || Driver::new(Habitual(habit), criterion(), params).unwrap();
+    let new = || Driver::new(Habitual(habit), criterion(), params.clone()).unwrap();
     let kept = |driver: &Driver<Habitual, C>| {
         let mut bytes = Vec::new();
         driver.session().checkpoint("job").unwrap().write(&mut bytes).unwrap();
@@ -264,13 +264,13 @@ fn a_tone_curve_is_resumed_with_its_function() {
         let driver = Driver::new(Noise(Repeats::Samples), FixedSpp(40), with).unwrap();
         driver.resume("noise", Checkpoint::read(&bytes[..]).unwrap())
     };
-    let resumed = resume(params(root), None, params(root)).unwrap();
+    let resumed = resume(params(root.clone()), None, params(root.clone())).unwrap();
     assert_eq!(resumed.session().display().unwrap().encode([0.25; 3]), [0.5; 3]);
     let other = ToneCurve::new(b"another root", |exposed| exposed.map(f32::sqrt));
-    let refused = resume(params(root), None, params(other));
+    let refused = resume(params(root.clone()), None, params(other.clone()));
     assert!(matches!(refused, Err(CheckpointError::Other { what: "tone mapping", .. })));
     let own = ToneMapping::Custom { exposure: 1.0, curve: other }.settle(&[]);
-    let resumed = resume(params(root), Some(own), params(root)).unwrap();
+    let resumed = resume(params(root.clone()), Some(own.clone()), params(root)).unwrap();
     assert_eq!(resumed.session().display(), Some(&own));
 }
 

@@ -4,23 +4,23 @@ use crate::rgb::Rgb;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// A function from exposed linear radiance to display values.
 type Map = dyn Fn(Rgb) -> Rgb + Send + Sync;
 
-/// The functions of all curves, by the digest of their identity: a curve is then a copyable value, and one that
-/// is read from a file has its function if this program has made the curve.
-static CURVES: Mutex<BTreeMap<[u8; 32], &'static Map>> = Mutex::new(BTreeMap::new());
+/// The functions of all curves that there are, by the digest of their identity: one that is read from a file
+/// has its function if this program holds the curve.
+static CURVES: Mutex<BTreeMap<[u8; 32], Weak<Map>>> = Mutex::new(BTreeMap::new());
 
-fn curves() -> MutexGuard<'static, BTreeMap<[u8; 32], &'static Map>> {
+fn curves() -> MutexGuard<'static, BTreeMap<[u8; 32], Weak<Map>>> {
     CURVES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A tone mapping of the caller's own, for [`crate::ToneMapping::Custom`]: a filmic curve, a LUT, a closure.
 ///
-/// Files keep its digest, because a function cannot be written down. Make the curve again before you read one: a
-/// digest without a curve is an error, so that no curve is without its function.
+/// Files keep its digest, because a function cannot be written down. Make the curve again before you read one,
+/// and hold it meanwhile: a digest without a curve is an error, so that no curve is without its function.
 ///
 /// ```
 /// use noisefloor::{Params, ToneMapping, display::ToneCurve};
@@ -35,22 +35,24 @@ fn curves() -> MutexGuard<'static, BTreeMap<[u8; 32], &'static Map>> {
 /// let params = Params::default().with_tone_mapping(ToneMapping::Custom { exposure: 1.0, curve: filmic });
 /// assert!(params.check().is_ok());
 /// ```
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct ToneCurve {
     digest: [u8; 32],
-    map: &'static Map,
+    map: Arc<Map>,
 }
 
 impl ToneCurve {
     /// A curve from exposed linear radiance, at least 0 and finite, to display-encoded sRGB. What it returns
     /// is clamped to [0, 1]; NaN becomes 0. It must return the same for the same radiance. `identity` is all
     /// that tells it from other curves: a name with a version and parameters, or the contents of a LUT. Of two
-    /// functions with one identity the first is used.
-    ///
-    /// The function is kept as long as the program runs.
+    /// functions with one identity the first is used, as long as one of its curves is there.
     pub fn new(identity: &[u8], map: impl Fn(Rgb) -> Rgb + Send + Sync + 'static) -> Self {
         let digest = *blake3::hash(identity).as_bytes();
-        let map = *curves().entry(digest).or_insert_with(|| Box::leak(Box::new(map)));
+        let mut curves = curves();
+        curves.retain(|_, kept| kept.strong_count() > 0);
+        let kept = curves.get(&digest).and_then(Weak::upgrade);
+        let map = kept.unwrap_or_else(|| Arc::new(map));
+        curves.insert(digest, Arc::downgrade(&map));
         Self { digest, map }
     }
 
@@ -88,7 +90,7 @@ impl<'de> Deserialize<'de> for ToneCurve {
         let text = String::deserialize(from)?;
         let hash = blake3::Hash::from_hex(text.as_bytes()).map_err(D::Error::custom)?;
         let digest = *hash.as_bytes();
-        let map = curves().get(&digest).copied();
+        let map = curves().get(&digest).and_then(Weak::upgrade);
         let unknown = || {
             D::Error::custom(format_args!("its tone curve {text} is another one: give the LUT that it had"))
         };
@@ -104,6 +106,22 @@ mod tests {
     fn whatever_it_returns_has_a_place_on_the_screen() {
         let odd = ToneCurve::new(b"odd", |[r, _, _]| [f32::NAN, -r, f32::INFINITY]);
         assert_eq!(odd.show([2.0; 3]), [0.0, 0.0, 1.0]);
+    }
+
+    /// A function goes with its last curve; until then, a second one of the same identity is not used.
+    #[test]
+    fn a_function_lives_as_long_as_its_curves() {
+        let held = Arc::new(());
+        let inner = Arc::clone(&held);
+        let first = ToneCurve::new(b"held", move |exposed| {
+            let _ = &inner;
+            exposed
+        });
+        let second = ToneCurve::new(b"held", |_| [0.0; 3]);
+        assert_eq!((Arc::strong_count(&held), second.show([0.5; 3])), (2, [0.5; 3]));
+        drop((first, second));
+        assert_eq!(Arc::strong_count(&held), 1);
+        assert_eq!(ToneCurve::new(b"held", |_| [0.0; 3]).show([0.5; 3]), [0.0; 3]);
     }
 
     #[test]

@@ -90,7 +90,7 @@ fn limits_hold() {
 fn one_verdict_is_not_a_streak() {
     let params = Params { consecutive: 3, ..steps_of_10() };
     // Each time a quarter more, in steps of 10
-    assert_eq!(run(&mut session(300, true, params)).map_samples(), [460, 930, 1400]);
+    assert_eq!(run(&mut session(300, true, params.clone())).map_samples(), [460, 930, 1400]);
     let params = Params { schedule: Schedule::Every { step: 100 }, ..params };
     assert_eq!(run(&mut session(300, true, params)).map_samples(), [500, 800, 1100]);
 }

@@ -93,7 +93,7 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
     )?;
     say!(
         "trained through  {}",
-        match summary.tone_mapping {
+        match &summary.tone_mapping {
             ToneMapping::Srgb { exposure } => format!("plain sRGB, exposure {exposure}"),
             ToneMapping::Custom { exposure, curve } =>
                 format!("a curve of its own ({}), exposure {exposure}", curve.digest()),
@@ -103,7 +103,6 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
             ToneMapping::ReinhardAt { exposure, .. } => format!("Reinhard, exposure {exposure}"),
         }
     )?;
-    // Logistic regression is kept as two support vectors of a kernel too wide to bend
     let machine = match summary.support_vectors {
         None => "straight line".to_owned(),
         Some(count) => format!("RBF kernel with {count} support vectors, γ = {}", record.gamma),

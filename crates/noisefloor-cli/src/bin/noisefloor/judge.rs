@@ -78,8 +78,8 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
 
     // Compare the picture with the others, and judge.
     let others: Vec<&Still> = others.iter().collect();
-    let held =
-        SnapshotPair::new(Evidence::Halves, &image, &others, job.tone, job.samples)?.seen_on(job.viewing);
+    let held = SnapshotPair::new(Evidence::Halves, &image, &others, job.tone.clone(), job.samples)?
+        .seen_on(job.viewing);
     if job.samples.is_none() && held.samples() == Samples::Nested {
         note!(
             "note: the pictures share samples, as snapshots of one rendering do, and are judged as --nested; --independent overrides this"

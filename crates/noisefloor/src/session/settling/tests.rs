@@ -111,7 +111,7 @@ fn the_first_stop_is_at_the_exposure_of_the_finished_picture() {
     all.extend([2, 100].map(|min| params().with_min_spp(min)));
     all.push(params().with_consecutive(3));
     for params in all {
-        for exposure in exposures(Hasty { halves: true }, params) {
+        for exposure in exposures(Hasty { halves: true }, params.clone()) {
             assert_close(exposure, &format!("{params:?}"));
         }
     }
@@ -138,7 +138,7 @@ fn the_order_of_tiles_changes_nothing() {
                 session.push(tile.index, spp, &mean).unwrap();
             }
         }
-        (session.stops().collect::<Vec<_>>(), session.display().copied())
+        (session.stops().collect::<Vec<_>>(), session.display().cloned())
     };
     let (forwards, mut order) = (run(&mut |_| 0), Noise::keyed(&[51]));
     assert_eq!(run(&mut |n| n - 1), forwards);
@@ -222,7 +222,7 @@ fn what_stopped_under_another_exposure_is_looked_at_again() {
 fn a_display_that_was_set_stays() {
     for display in [Display::SRGB, ToneMapping::Srgb { exposure: 3.0 }.settle(&[])] {
         let mut session = Session::new(SIZE.0, SIZE.1, Hasty { halves: true }, params()).unwrap();
-        session.set_display(display).unwrap();
+        session.set_display(display.clone()).unwrap();
         while !session.is_done() {
             for request in session.requests() {
                 let Batch { tile, spp, mean } = Room.batch(&request);
@@ -253,7 +253,7 @@ fn a_session_that_is_resumed_settles_as_if_it_had_not_been() {
     let begin = || Driver::new(Room, Hasty { halves: true }, params().with_consecutive(2)).unwrap();
     let outcome = |driver: &Driver<Room, Hasty>| {
         let film = driver.session().film().image();
-        (driver.session().stops().collect::<Vec<_>>(), driver.session().display().copied(), film)
+        (driver.session().stops().collect::<Vec<_>>(), driver.session().display().cloned(), film)
     };
     let mut whole = begin();
     whole.run(|_, _| ()).unwrap();
@@ -300,7 +300,7 @@ fn two_pictures_are_judged_at_the_exposure_of_their_render() {
     let (a, b, tone) = (still(0), still(1), ToneMapping::default());
     let whole = Still { pixels: film.image(), spp: 64.0, ..a.clone() };
     let judged = |image, other, samples| {
-        let pair = SnapshotPair::new(Evidence::Halves, image, &[other], tone, Some(samples)).unwrap();
+        let pair = SnapshotPair::new(Evidence::Halves, image, &[other], tone.clone(), Some(samples)).unwrap();
         pair.display().exposure() / session.display().unwrap().exposure() - 1.0
     };
     for (image, other, samples) in [
@@ -313,6 +313,6 @@ fn two_pictures_are_judged_at_the_exposure_of_their_render() {
         assert!(off.abs() < 1e-4, "{samples:?}: {off}");
     }
     // A reference has its own
-    let pair = SnapshotPair::new(Evidence::Reference, &a, &[&whole], tone, None).unwrap();
+    let pair = SnapshotPair::new(Evidence::Reference, &a, &[&whole], tone.clone(), None).unwrap();
     assert_eq!(pair.display(), &tone.settle(&whole.pixels));
 }

@@ -128,8 +128,9 @@ impl CompareArgs {
             source,
             resources,
             out: self.out,
-            criteria: Box::new(move || {
-                specs.iter().map(|spec| criterion(spec, &oracle, &params, denoised.as_ref())).collect()
+            criteria: Box::new({
+                let value = params.clone();
+                move || specs.iter().map(|spec| criterion(spec, &oracle, &value, denoised.as_ref())).collect()
             }),
             denoiser: denoiser.map(|denoiser| Box::new(denoiser) as Box<dyn Denoiser>),
             params,
@@ -190,7 +191,7 @@ fn criterion(
     params: &Params,
     denoiser: Option<&Shared>,
 ) -> anyhow::Result<Named> {
-    let mut params = *params;
+    let mut params = params.clone();
     let (family, words) = spec.split_once(':').unwrap_or((spec, ""));
     let criterion: Box<dyn StoppingCriterion + Send> = match family {
         "oracle" => {

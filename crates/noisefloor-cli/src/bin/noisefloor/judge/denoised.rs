@@ -65,7 +65,7 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
             job.denoised[1].display()
         );
     }
-    let pair = SnapshotPair::new(Evidence::Halves, &a, &[&b], job.tone, job.samples)?;
+    let pair = SnapshotPair::new(Evidence::Halves, &a, &[&b], job.tone.clone(), job.samples)?;
     if pair.samples() == Samples::Nested {
         bail!(
             "--denoised needs two halves that share no samples, and these are snapshots of one rendering: the later one contains \

@@ -261,7 +261,7 @@ impl<'a> Judges<'a> {
         if !std::mem::replace(&mut self.warned, true) {
             compared.warnings().iter().for_each(|warning| note!("warning: {warning}"));
         }
-        let display = *compared.display();
+        let display = compared.display().clone();
         let spp = spp.map(|each| 2.0 * each);
         let mean = halves.mean().to_vec();
         match (self.criterion, &mut self.denoiser) {
