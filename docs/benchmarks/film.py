@@ -242,7 +242,7 @@ if task == "denoised":
             return json.loads(said)["tiles"][0]["jods_lost"]
 
     print("| denoised | spp | still: package, here | 24 fps: package, here |\n|---|---|---|---|")
-    for scene in ("cornell-box", "arcade"):
+    for scene in SCENES:
         pictures, reference, exposure = truth_of(scene)
         for spp, of in pictures.items():
             pairs = [(of[2 * i], of[2 * i + 1]) for i in range(FRAMES // 2)]
