@@ -38,7 +38,7 @@ if task == "forecast":
     # Twelve sequences whose camera moves, two seeds each: a forecast first, then the rest of the frames
     from moving import MOVES, SCENES as MOVING, write_frames
 
-    count, size, rows = 24, "96x96", []
+    count, size, rows, by_small = 24, "96x96", [], []
 
     def spread(few):
         """So many frames at equal distances, counted from 0."""
@@ -50,12 +50,19 @@ if task == "forecast":
 
     for scene, move, seed in ((s, m, seed) for s in MOVING for m in MOVES for seed in (1, 2)):
         out, pattern = folder / f"{scene}-{move}-{seed}", write_frames(folder / "scenes", scene, move, count)
-        sequence = [program, "render", "--frames", f"1-{count}", pattern, "--size", size, "--tile", "48", "--fps", "24",
-                    "--max-spp", "4000", "--seed", str(seed), "--out", str(out), "--quiet", "--resume"]
+        common = [program, "render", "--frames", f"1-{count}", pattern, "--fps", "24", "--max-spp", "4000", "--seed",
+                  str(seed), "--quiet", "--resume"]
+        sequence = [*common, "--size", size, "--tile", "48", "--out", str(out)]
         if not (out / "forecast.json").exists():
             subprocess.run([*sequence, "--forecast"], check=True, stderr=subprocess.DEVNULL)
         subprocess.run(sequence, check=True, stderr=subprocess.DEVNULL)
         said = json.loads((out / "forecast.json").read_text())
+        # The same from frames of half the width and height
+        small = folder / f"{out.name}-small"
+        if not (small / "forecast.json").exists():
+            subprocess.run([*common, "--size", "48x48", "--tile", "24", "--out", str(small), "--forecast"], check=True,
+                           stderr=subprocess.DEVNULL)
+        smaller = json.loads((small / "forecast.json").read_text())["spp"]["expected"]
         # What it took: by the tiles of stops.csv, which are all of one size, and by the reports
         spp, seconds = np.zeros(count), np.zeros(count)
         for i in range(count):
@@ -70,6 +77,7 @@ if task == "forecast":
         for kind, values in (("spp", spp / count), ("seconds", seconds)):
             assert math.isclose(by_lines(values, 5), said[kind]["expected"], rel_tol=1e-9), (out, kind)
         rows.append((f"{scene}, {move}", seed, said, spp, seconds))
+        by_small.append(smaller / spp.mean())
         print(f"{out.name}: {said['spp']['expected']:.1f} spp, took {spp.mean():.1f}", file=sys.stderr, flush=True)
 
     print("| camera | seed | samples per pixel: least, most of a frame | forecast: range | took | off by |"
@@ -96,6 +104,8 @@ if task == "forecast":
               for kind in ("spp", "seconds")]
     print(f"\nWithin the range: samples {within[0]}, seconds {within[1]} of {len(rows)}. Half a range is ×{widths[0]:.2f} "
           f"and ×{widths[1]:.2f} on average.")
+    print(f"From small frames, samples are off by ×{math.exp(np.mean(np.log(by_small))):.2f} on average, "
+          f"×{min(by_small):.2f} to ×{max(by_small):.2f}; within ×1.25: {sum(off(f, 1) <= 1.25 for f in by_small)}.")
     sys.exit()
 
 import OpenEXR, torch, pycvvdp
@@ -242,7 +252,7 @@ if task == "denoised":
             return json.loads(said)["tiles"][0]["jods_lost"]
 
     print("| denoised | spp | still: package, here | 24 fps: package, here |\n|---|---|---|---|")
-    for scene in ("cornell-box", "arcade"):
+    for scene in SCENES:
         pictures, reference, exposure = truth_of(scene)
         for spp, of in pictures.items():
             pairs = [(of[2 * i], of[2 * i + 1]) for i in range(FRAMES // 2)]

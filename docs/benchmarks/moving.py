@@ -36,7 +36,8 @@ def lamp(centre, half, radiance):
 WHITE, RED, GREEN, GREY = map(diffuse, ("0.73", "0.6, 0.1, 0.08", "0.15, 0.45, 0.12", "0.4"))
 METAL = '<bsdf type="roughconductor"><float name="alpha" value="0.2"/><string name="material" value="Al"/></bsdf>'
 GLASS = '<bsdf type="dielectric"/>'
-PLASTIC = f'<bsdf type="roughplastic"><float name="alpha" value="0.15"/>{rgb("diffuse_reflectance", "0.2, 0.3, 0.6")}</bsdf>'
+BLUE = rgb("diffuse_reflectance", "0.2, 0.3, 0.6")
+PLASTIC = f'<bsdf type="roughplastic"><float name="alpha" value="0.15"/>{BLUE}</bsdf>'
 
 
 def room(width, height, depth, walls=(RED, GREEN)):
@@ -63,39 +64,43 @@ def arc(centre, radius, height, begin, end):
 
 still = lambda point: lambda t: point
 
+columns = lambda xs, zs, half: "".join(box((x, half[1], z), half, WHITE) for x in xs for z in zs)
+emitter = lambda kind, inside: f'<emitter type="{kind}">{inside}</emitter>'
+
 # What there is, and for each move where the camera is and what it looks at
 SCENES = {
     "blocks": (
-        room(1, 2, 2) + lamp((0, 1.98, -0.8), (0.35, 0.35), "14, 12, 9") + box((-0.35, 0.6, -1.1), (0.3, 0.6, 0.3), WHITE)
-        + box((0.4, 0.3, -0.6), (0.3, 0.3, 0.3), PLASTIC),
+        room(1, 2, 2) + lamp((0, 1.98, -0.8), (0.35, 0.35), "14, 12, 9")
+        + box((-0.35, 0.6, -1.1), (0.3, 0.6, 0.3), WHITE) + box((0.4, 0.3, -0.6), (0.3, 0.3, 0.3), PLASTIC),
         (line((0, 1, 1.9), (0.1, 0.9, 0.6)), still((0, 0.8, -1))),
         (arc((0, 1, -0.8), 2.2, 1.1, -20, 20), still((0, 0.8, -0.8)))),
     "bulb": (
-        room(2, 2.4, 3, (WHITE, PLASTIC)) + ball((0.6, 1.7, -1.2), 0.08, GREY, f'<emitter type="area">{rgb("radiance", "90, 75, 55")}</emitter>')
+        room(2, 2.4, 3, (WHITE, PLASTIC))
+        + ball((0.6, 1.7, -1.2), 0.08, GREY, emitter("area", rgb("radiance", "90, 75, 55")))
         + ball((-0.7, 0.5, -1.6), 0.5, METAL) + box((0.9, 0.4, -0.8), (0.3, 0.4, 0.3), RED),
         (line((-1.4, 1.2, 2.6), (1.2, 1.4, 1.2)), still((0, 0.9, -1.5))),
         (still((0, 1.3, 2)), line((-1.8, 0.8, -1), (1.8, 1.2, -1)))),
     "glass": (
-        room(1.5, 2, 2, (GREEN, WHITE)) + lamp((0.2, 1.98, -0.5), (1.1, 1.1), "5, 4.6, 4") + ball((-0.4, 0.45, -0.7), 0.45, GLASS)
-        + ball((0.55, 0.35, -1.1), 0.35, PLASTIC),
+        room(1.5, 2, 2, (GREEN, WHITE)) + lamp((0.2, 1.98, -0.5), (1.1, 1.1), "5, 4.6, 4")
+        + ball((-0.4, 0.45, -0.7), 0.45, GLASS) + ball((0.55, 0.35, -1.1), 0.35, PLASTIC),
         (line((0.9, 1.3, 1.8), (-0.9, 0.7, 1)), still((0, 0.5, -0.8))),
         (arc((0, 0.5, -0.8), 2.3, 1, 15, -20), still((0, 0.5, -0.8)))),
     "yard": (
-        box((0, -0.1, 0), (12, 0.1, 12), GREY) + "".join(box((x, 1.2, -2), (0.2, 1.2, 0.2), WHITE) for x in (-4, -2, 0, 2, 4))
-        + box((0, 2.6, -2), (4.6, 0.2, 0.8), WHITE) + box((0, 1.6, -4), (5, 1.6, 0.2), RED) + ball((1, 0.6, 0), 0.6, PLASTIC)
-        + f'<emitter type="constant">{rgb("radiance", "0.5, 0.7, 1")}</emitter>'
-        + f'<emitter type="directional"><vector name="direction" x="0.5" y="-1" z="-0.6"/>{rgb("irradiance", "4, 3.7, 3")}</emitter>',
+        box((0, -0.1, 0), (12, 0.1, 12), GREY) + columns((-4, -2, 0, 2, 4), (-2,), (0.2, 1.2, 0.2))
+        + box((0, 2.6, -2), (4.6, 0.2, 0.8), WHITE) + box((0, 1.6, -4), (5, 1.6, 0.2), RED)
+        + ball((1, 0.6, 0), 0.6, PLASTIC) + emitter("constant", rgb("radiance", "0.5, 0.7, 1"))
+        + emitter("directional", '<vector name="direction" x="0.5" y="-1" z="-0.6"/>' + rgb("irradiance", "4, 3.7, 3")),
         (line((-4, 1.5, 2.5), (4, 1.5, -0.5)), line((-2, 1, -3), (2, 1, -3))),
         (still((0, 1.4, 1.5)), line((-5, 0.8, -3), (5, 1.6, -3)))),
     "hall": (
         room(1.5, 2.5, 8) + "".join(lamp((0, 2.48, z), (0.3, 0.3), "10, 9, 8") for z in (-6, -2, 2, 6))
-        + "".join(box((x, 1.25, z), (0.12, 1.25, 0.12), WHITE) for x in (-0.9, 0.9) for z in (-6, -4, -2, 0, 2, 4))
-        + box((0.3, 0.4, -3), (0.3, 0.4, 0.3), PLASTIC),
+        + columns((-0.9, 0.9), (-6, -4, -2, 0, 2, 4), (0.12, 1.25, 0.12)) + box((0.3, 0.4, -3), (0.3, 0.4, 0.3), PLASTIC),
         (line((0, 1.4, 7.5), (0, 1.4, 1)), line((0, 1.2, 0), (0, 1.2, -7))),
         (still((0, 1.4, 0)), line((-2, 1, -7), (3, 1.2, -0.5)))),
     "screen": (
         # Lit from behind a wall that is half as high as the room
-        room(2, 2.4, 3, (WHITE, GREY)) + box((0.4, 0.7, -1.4), (1.1, 0.7, 0.06), RED) + lamp((0.6, 2.38, -2.1), (0.8, 0.5), "16, 15, 13")
+        room(2, 2.4, 3, (WHITE, GREY)) + box((0.4, 0.7, -1.4), (1.1, 0.7, 0.06), RED)
+        + lamp((0.6, 2.38, -2.1), (0.8, 0.5), "16, 15, 13")
         + ball((-0.9, 0.5, -0.8), 0.5, PLASTIC) + box((0.8, 0.3, 0), (0.4, 0.3, 0.3), WHITE),
         (line((0, 1.3, 2.8), (-0.9, 1.2, 1)), still((-0.6, 0.9, -1.6))),
         (still((0.2, 1.3, 2.2)), line((-1.8, 0.8, -1), (1.6, 0.8, -1)))),

@@ -162,7 +162,8 @@ fn stops_and_picture_are_those_of_rust_whatever_the_number_of_threads() {
     }
 }
 
-/// With a rate in the viewing conditions, stops are those of a frame of a film in Rust: earlier than a still's.
+/// With a rate in the viewing conditions, stops are those of a frame of a film in Rust: earlier than a
+/// still's.
 #[test]
 fn a_frame_of_a_film_stops_earlier() {
     let spp = |viewing: &CStr| {

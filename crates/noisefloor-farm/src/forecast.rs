@@ -28,14 +28,14 @@ pub struct Forecast {
 }
 
 impl Forecast {
-    /// From frames and what each of them took, in any order; `None` from fewer than two different frames, unless
-    /// they are all.
+    /// From frames and what each of them took, in any order; `None` from fewer than two different frames,
+    /// unless they are all.
     ///
-    /// Frames between two known ones are interpolated, and those beyond are as the nearest. The range comes from how
-    /// much neighbours among the known frames differ (von Neumann, Kent, Bellinson and Hart 1941: half the mean square
-    /// of successive differences is the variance), as if any two frames differed as much as these. Where the camera
-    /// moves steadily, frames near each other are more alike, and the range is wider than it need be. What happens
-    /// only between the known frames, nobody has seen.
+    /// Frames between two known ones are interpolated, and those beyond are as the nearest. The range comes
+    /// from how much neighbours among the known frames differ (von Neumann, Kent, Bellinson and Hart 1941:
+    /// half the mean square of successive differences is the variance), as if any two frames differed as much
+    /// as these. Where the camera moves steadily, frames near each other are more alike, and the range is
+    /// wider than it need be. What happens only between the known frames, nobody has seen.
     pub fn of(frames: FrameRange, known: &[(u32, f64)]) -> Option<Self> {
         let mut known: Vec<_> = known.iter().filter(|(frame, _)| frames.contains(*frame)).copied().collect();
         known.sort_by_key(|(frame, _)| *frame);
@@ -49,7 +49,8 @@ impl Forecast {
             return None;
         }
 
-        // How often each known frame stands for an unknown one: lines between neighbours, summed over the frames
+        // How often each known frame stands for an unknown one: lines between neighbours, summed over the
+        // frames
         let (first, last) = (known[0].0, known[known.len() - 1].0);
         let mut weights = vec![0.0; known.len()];
         weights[0] = f64::from(first - frames.first());
@@ -105,9 +106,9 @@ mod tests {
         assert_eq!(Forecast::of(frames("1-9"), &[(1, 0.0), (9, 0.0)]).map(|one| one.high), Some(0.0));
     }
 
-    /// Of 2,000 sequences whose frames differ by chance alone, nine of ten are within the range. A program of its own
-    /// finds 89.6, 88.5 and 88.8 % of 40,000 (successive differences hang together); 1,713 to 1,850 are four standard
-    /// deviations to each side, 14 sequences each.
+    /// Of 2,000 sequences whose frames differ by chance alone, nine of ten are within the range. A program of
+    /// its own finds 89.6, 88.5 and 88.8 % of 40,000 (successive differences hang together); 1,713 to 1,850
+    /// are four standard deviations to each side, 14 sequences each.
     #[test]
     fn nine_of_ten_sequences_are_within_the_range() {
         let (all, mut noise) = (frames("1-48"), Noise::new(7));

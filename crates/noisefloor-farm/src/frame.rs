@@ -33,7 +33,8 @@ pub(crate) struct Frame<'a, S: Studio> {
 }
 
 impl<S: Studio> Frame<'_, S> {
-    /// Opens the scene once, and keeps what it is; `waits` says whether its job is to change once others are done.
+    /// Opens the scene once, and keeps what it is; `waits` says whether its job is to change once others are
+    /// done.
     pub(crate) fn plan(&self, waits: bool) -> Result<(), FarmError> {
         let path = self.folder.frame(self.name);
         if let Some(file) = self.studio.occupied(&path) {
@@ -56,7 +57,8 @@ impl<S: Studio> Frame<'_, S> {
         self.folder.write_frame_job(self.name, &FrameJob { scene, source: info.name, shards, waits })
     }
 
-    /// Takes up the job that follows from the frames that this one has waited for. Its scene is not opened again.
+    /// Takes up the job that follows from the frames that this one has waited for. Its scene is not opened
+    /// again.
     pub(crate) fn begin(&self) -> Result<(), FarmError> {
         let frame = self.folder.frame_job(self.name)?;
         if !frame.waits {

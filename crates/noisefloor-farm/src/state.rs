@@ -122,8 +122,8 @@ impl<J> FarmPlan<J> {
         Self { version: PLAN_VERSION, job, frames, tasks, keep, first: Vec::new() }
     }
 
-    /// The same, where all other frames wait for these, and take from them what they have come to: an exposure.
-    /// Frames that the sequence does not have are left out.
+    /// The same, where all other frames wait for these, and take from them what they have come to: an
+    /// exposure. Frames that the sequence does not have are left out.
     #[must_use]
     pub fn with_first(self, mut first: Vec<u32>) -> Self {
         first.retain(|frame| self.frames.is_some_and(|frames| frames.contains(*frame)));

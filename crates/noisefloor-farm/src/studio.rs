@@ -23,8 +23,8 @@ pub trait Studio {
     /// The job of a frame of a sequence.
     fn of_frame(&self, job: &Self::Job, frame: u32) -> Self::Job;
 
-    /// The job of a frame that has waited for others, which are done: their numbers and folders. By default, they
-    /// have changed nothing.
+    /// The job of a frame that has waited for others, which are done: their numbers and folders. By default,
+    /// they have changed nothing.
     ///
     /// # Errors
     /// Its own.

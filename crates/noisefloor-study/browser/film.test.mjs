@@ -1,4 +1,4 @@
-// Loops of frames in Chromium: the stack's frames are grey by their numbers in one corner, and the reference's there, too.
+// Loops of frames in Chromium: the stack's frames, the reference's as well, are grey by their numbers in a corner.
 
 import { describe, test } from "node:test";
 import assert from "node:assert/strict";
@@ -8,7 +8,7 @@ const { FILM, FILM_FORCED } = process.env;
 const FRAMES = 6;
 const FPS = 24;
 
-/** What the corners of all pictures say at each picture of the browser, for so many milliseconds: [time, frames]. */
+/** What the corners of all pictures say whenever the browser draws, for so many milliseconds: [time, frames]. */
 const watched = (page, ms) =>
   page.evaluate(
     async ([ms, count]) => {
@@ -42,10 +42,8 @@ describe("loops of frames", SIDE_BY_SIDE, () => {
     await heading(page, "Practice 1 of 2");
     await look(page);
     const seen = await watched(page, 2000);
-    assert.ok(
-      seen.every(([, frames]) => frames.length === 2 && frames[0] === frames[1] && Number.isInteger(frames[0])),
-      JSON.stringify(seen.slice(0, 5)),
-    );
+    const alike = ([, [one, other]]) => one === other && Number.isInteger(one);
+    assert.ok(seen.every(alike), JSON.stringify(seen.slice(0, 5)));
     // Each frame comes after the one before, unless some were dropped, and by the clock
     assert.equal(new Set(seen.map(([, frames]) => frames[0])).size, FRAMES);
     for (const [now, [frame]] of seen) {

@@ -277,7 +277,8 @@ async function forcedChoice(room) {
   const levels = (level) =>
     Array.from({ length: picture.count }, (_, i) => (i === trial.tile ? level : last));
   const all = levels(last).map((level, i) => tile(study, trial.stack, level, i));
-  await Promise.all([...all, ...[trial.first, trial.second].map((l) => tile(study, trial.stack, l, trial.tile))]);
+  const both = [trial.first, trial.second].map((level) => tile(study, trial.stack, level, trial.tile));
+  await Promise.all([...all, ...both]);
   const pause = room.bind("P", t.pause, () => room.finish("pause"));
 
   room.say.textContent = t.look_here;

@@ -32,8 +32,8 @@ pub(crate) struct Source {
     pub(crate) tile: usize,
 }
 
-/// Pictures of one view, ordered by samples per pixel. The last one is the reference. Each is a still, or a loop of
-/// frames that are shown one after the other.
+/// Pictures of one view, ordered by samples per pixel. The last one is the reference. Each is a still, or a
+/// loop of frames that are shown one after the other.
 #[derive(Debug)]
 pub struct StudyStack {
     name: String,
@@ -45,7 +45,8 @@ pub struct StudyStack {
     paths: Vec<Vec<PathBuf>>,
     /// Frames per second of a loop.
     fps: Option<f64>,
-    /// Tone mapping of linear pictures, fitted to the reference of the first frame and shared by all. `None` for PNGs.
+    /// Tone mapping of linear pictures, fitted to the reference of the first frame and shared by all. `None`
+    /// for PNGs.
     display: Option<Display>,
     /// Level at which each tile had stopped: the first with at least that many samples.
     stops: Option<Vec<u32>>,
@@ -244,8 +245,8 @@ fn frames_of(folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
     frames.sort();
     if !(2..=MAX_FRAMES).contains(&frames.len()) {
         let what = format!(
-            "{} folders of frames; a loop (a stack with fps) has 2 to {MAX_FRAMES}: 0001, 0002 and so on, each with \
-             pictures of all levels",
+            "{} folders of frames; a loop (a stack with fps) has 2 to {MAX_FRAMES}: 0001, 0002 and so on, \
+             each with pictures of all levels",
             frames.len()
         );
         return Err(StudyError::File { path: folder.to_owned(), what });

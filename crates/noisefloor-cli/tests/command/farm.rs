@@ -270,9 +270,9 @@ fn pipes_and_huge_numbers_hold_nothing_up() {
     assert_eq!(json(&dir.join("frame/report.json"))["complete"], true);
 }
 
-/// Frames of a farm are those of `render --frames`: new noise in each, and one exposure, which the farm finds in the
-/// first frame, or in those that are named, while the others wait; or which it is given. Whoever lets each frame settle its
-/// own is warned.
+/// Frames of a farm are those of `render --frames`: new noise in each, and one exposure, which the farm finds
+/// in the first frame, or in those that are named, while the others wait; or which it is given. Whoever lets
+/// each frame settle its own is warned.
 #[test]
 fn a_farm_renders_the_frames_of_a_sequence() {
     let folder = tempdir().unwrap();

@@ -130,8 +130,8 @@ fn frames_take_their_exposure_from_where_they_are_told() {
     fail(&["render", "--exposure", "2", "--key", "0.2"], &["either --key or --exposure"]);
 }
 
-/// Between several frames, which are rendered first, the exposure is eased by equal factors; a sequence that is taken up
-/// again has the same.
+/// Between several frames, which are rendered first, the exposure is eased by equal factors; a sequence that
+/// is taken up again has the same.
 #[test]
 fn exposure_is_eased_between_frames() {
     let folder = shots();
@@ -173,8 +173,8 @@ fn exposure_is_eased_between_frames() {
     fail(&["render", "--exposure-from", text(&out)], &["several exposures"]);
 }
 
-/// A forecast renders a few frames of the sequence, says what all take, and loses nothing: the sequence goes on from
-/// them.
+/// A forecast renders a few frames of the sequence, says what all take, and loses nothing: the sequence goes
+/// on from them.
 #[test]
 fn a_forecast_renders_frames_that_the_sequence_keeps() {
     let folder = shots();

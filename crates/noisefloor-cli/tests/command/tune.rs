@@ -62,7 +62,8 @@ fn samples_that_were_found_are_enough_for_other_seeds() {
     }
 }
 
-/// The frames of a film need fewer samples than a still, whichever way the rate is given; nobody was asked about that.
+/// The frames of a film need fewer samples than a still, whichever way the rate is given; nobody was asked
+/// about that.
 #[test]
 fn frames_of_a_film_need_fewer_samples() {
     let tune = |more: &[&str]| -> f64 { succeed(&[&SMALL[..], more].concat()).trim().parse().unwrap() };

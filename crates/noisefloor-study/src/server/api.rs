@@ -136,7 +136,8 @@ pub(crate) async fn erase(
     Ok(StatusCode::NO_CONTENT.into_response())
 }
 
-/// `GET /api/tiles/{stack}/{level}/{tile}`, where the tile is `5.png`, or `5.2.png` for another frame than the first
+/// `GET /api/tiles/{stack}/{level}/{tile}`, where the tile is `5.png`, or `5.2.png` for another frame than
+/// the first
 pub(crate) async fn tile(
     State(app): Shared,
     place: Result<Path<(String, String, String)>, PathRejection>,

@@ -38,14 +38,15 @@ pub(crate) fn stack(dir: &Path, (width, height): (usize, usize), levels: &[u64])
     }
 }
 
-/// Folders of running means for the frames of a loop: noise that is new in each, and in the first four pixels of the
-/// first four rows a grey by the number of the frame.
+/// Folders of running means for the frames of a loop: noise that is new in each, and in the first four pixels
+/// of the first four rows a grey by the number of the frame.
 pub(crate) fn film(dir: &Path, (width, height): (usize, usize), levels: &[u64], frames: usize) {
     for frame in 0..frames {
         let folder = dir.join(format!("{:04}", frame + 1));
         std::fs::create_dir_all(&folder).unwrap();
         for &spp in levels {
-            // Shifted by rows, so that the noise is new in each frame; that the wall moves as well does not matter
+            // Shifted by rows, so that the noise is new in each frame; that the wall moves as well does not
+            // matter
             let mut bytes = picture(width, height, spp);
             bytes.rotate_left(3 * width * (frame % height));
             for (y, x) in (0..4).flat_map(|y| (0..4).map(move |x| (y, x))) {

@@ -113,7 +113,8 @@ fn stops_become_levels() {
     }
 }
 
-/// A stack with a rate is a loop: a folder of pictures for each frame, all with the same levels, sizes and exposure.
+/// A stack with a rate is a loop: a folder of pictures for each frame, all with the same levels, sizes and
+/// exposure.
 #[test]
 fn a_stack_may_be_a_loop_of_frames() {
     let folder = Folder::new("acquisition", &["wall"], &levels(4, 2.0), "");
@@ -150,8 +151,8 @@ fn a_stack_may_be_a_loop_of_frames() {
     assert!(matches!(folder.study().check_pictures(), Err(StudyError::Size { .. })));
 }
 
-/// Simulated observers of a still and of a loop with lower thresholds: the analysis finds both, and the corpus for models
-/// of stills has the still only.
+/// Simulated observers of a still and of a loop with lower thresholds: the analysis finds both, and the
+/// corpus for models of stills has the still only.
 #[test]
 fn thresholds_of_loops_are_found_and_kept_out_of_the_corpus() {
     let folder = Folder::new("acquisition", &["wall", "film"], &levels(14, 1.45), "repeats = 2");

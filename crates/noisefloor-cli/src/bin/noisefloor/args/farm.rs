@@ -86,8 +86,8 @@ struct PlanArgs {
     /// Folder of the farm, on a file system that all machines share.
     dir: PathBuf,
     /// First and last frame. {frame} in the name of the scene, or {frame:04} for four digits, is the number
-    /// of the frame. Each frame has a seed of its own. All have the exposure of the first, for which they wait;
-    /// after `--`, --exposure-from or --exposure give another.
+    /// of the frame. Each frame has a seed of its own. All have the exposure of the first, for which they
+    /// wait; after `--`, --exposure-from or --exposure give another.
     #[arg(long, value_name = "A-B")]
     frames: Option<FrameRange>,
     /// Most tasks of a round over all frames, up to 1000; short rounds have fewer.
@@ -228,8 +228,8 @@ fn renders(
     let absent = |frame: &&u32| frames.is_some_and(|frames| !frames.contains(**frame));
     if let Some(frame) = exposure.frames().iter().find(absent) {
         refuse!(
-            "--exposure-from: frame {frame} is not among the frames of the farm; render it first, and give its output \
-             folder"
+            "--exposure-from: frame {frame} is not among the frames of the farm; render it first, and give \
+             its output folder"
         );
     }
     let RenderRun { job, resources, out, time, against, earlier, tev, watch, .. } = run;

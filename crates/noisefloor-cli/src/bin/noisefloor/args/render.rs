@@ -96,9 +96,9 @@ pub struct RenderArgs {
     /// one exposure (--exposure-from). With --fps, they are judged as frames of a film.
     #[arg(long, value_name = "FIRST-LAST")]
     frames: Option<FrameRange>,
-    /// Render only this many frames of --frames, at equal distances, and say what all of them will take: samples
-    /// per pixel and time, with a range, into forecast.json. The frames are kept: without this option,
-    /// --resume goes on from them [default: 5].
+    /// Render only this many frames of --frames, at equal distances, and say what all of them will take:
+    /// samples per pixel and time, with a range, into forecast.json. The frames are kept: without this
+    /// option, --resume goes on from them [default: 5].
     #[arg(
         long,
         value_name = "FRAMES",
@@ -254,8 +254,8 @@ impl RenderArgs {
     pub fn check(self) -> anyhow::Result<RenderRun> {
         if matches!(self.exposure_from, Some(ExposureFrom::First | ExposureFrom::Frames(_))) {
             refuse!(
-                "--exposure-from: frames need --frames; a single render takes the exposure of another render, by its \
-                 output folder"
+                "--exposure-from: frames need --frames; a single render takes the exposure of another \
+                 render, by its output folder"
             );
         }
         self.check_one()

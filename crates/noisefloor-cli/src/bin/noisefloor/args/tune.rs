@@ -93,8 +93,8 @@ pub struct TuneArgs {
     tone: ToneArgs,
     #[command(flatten, next_help_heading = "What people see")]
     viewing: ViewingArgs,
-    /// Find the setting for the frames of a film of so many frames per second, each with new noise: fewer samples,
-    /// or a coarser threshold, by the vision model. Nobody has been asked about films.
+    /// Find the setting for the frames of a film of so many frames per second, each with new noise: fewer
+    /// samples, or a coarser threshold, by the vision model. Nobody has been asked about films.
     #[arg(long, value_name = "RATE", value_parser = rate, help_heading = "What people see")]
     fps: Option<f64>,
     #[command(flatten, next_help_heading = "What people see")]

@@ -17,8 +17,8 @@ pub enum SequenceExposure {
     Of(Vec<u32>, bool),
 }
 
-/// One frame of exposure.json: what a sequence keeps, so that frames which are rendered later, or elsewhere, have the same
-/// exposure.
+/// One frame of exposure.json: what a sequence keeps, so that frames which are rendered later, or elsewhere,
+/// have the same exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeyExposure {
     pub frame: u32,
@@ -27,8 +27,9 @@ pub struct KeyExposure {
 
 const KEPT: &str = "exposure.json";
 
-/// The exposure of a frame by key frames in ascending order; none of a key frame, which settles its own, or without any.
-/// Between two it changes by the same factor from frame to frame, as equal steps look equal; outside it stays.
+/// The exposure of a frame by key frames in ascending order; none of a key frame, which settles its own, or
+/// without any. Between two it changes by the same factor from frame to frame, as equal steps look equal;
+/// outside it stays.
 pub fn eased(keys: &[KeyExposure], frame: u32) -> Option<f32> {
     let next = keys.partition_point(|key| key.frame < frame);
     let before = next.checked_sub(1).map(|index| keys[index]);
@@ -69,8 +70,8 @@ impl SequenceExposure {
         if *typed && !kept.is_empty() && !kept.iter().map(|key| &key.frame).eq(frames) {
             let of: Vec<String> = kept.iter().map(|key| key.frame.to_string()).collect();
             bail!(
-                "{} has the exposure of frame {}, which the frames that are there have: leave out --exposure-from, or \
-                 render all frames again with --force",
+                "{} has the exposure of frame {}, which the frames that are there have: leave out \
+                 --exposure-from, or render all frames again with --force",
                 path.display(),
                 of.join(", ")
             );

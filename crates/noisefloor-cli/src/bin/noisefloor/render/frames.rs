@@ -32,8 +32,8 @@ pub struct SequenceRun {
 }
 
 impl SequenceRun {
-    /// The run of one frame, in a folder of its own; with the exposure that it has by the key frames, unless it is one
-    /// of them.
+    /// The run of one frame, in a folder of its own; with the exposure that it has by the key frames, unless
+    /// it is one of them.
     fn of_frame(&self, frame: u32, keys: &[KeyExposure]) -> RenderRun {
         let out = self.out.join(FrameRange::folder(frame));
         let against = self.run.against.as_ref().map(|against| against.of_frame(frame));
@@ -128,8 +128,8 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
             let exposure = report.and_then(|report| report.exposure);
             let exposure = exposure.with_context(|| {
                 format!(
-                    "frame {frame} ended before its exposure was known, which other frames are to have: give it more \
-                     --time, or give --exposure"
+                    "frame {frame} ended before its exposure was known, which other frames are to have: give \
+                     it more --time, or give --exposure"
                 )
             })?;
             found.push(KeyExposure { frame, exposure });
@@ -158,8 +158,8 @@ pub const ONE_SEED: &str = "with one seed for all frames, their noise stands sti
      times the samples to vanish. Leave out --same-seed";
 
 /// What is unwise about an exposure for each frame.
-pub const EACH: &str = "each frame settles an exposure of its own. Those of frames that differ by noise alone differ by several percent, \
-     and the film flickers: leave out --exposure-from each";
+pub const EACH: &str = "each frame settles an exposure of its own. Those of frames that differ by noise \
+     alone differ by several percent, and the film flickers: leave out --exposure-from each";
 
 /// Says what is unwise about a sequence.
 fn warn(sequence: &SequenceRun) {
