@@ -111,7 +111,8 @@ impl NfSession {
     /// Takes the place of what the session was.
     pub(crate) fn resume(&self, job: &str, checkpoint: Checkpoint<'_>) -> Result<(), Failure> {
         let mut locked = self.lock()?;
-        let mut fresh = self.judging.fresh((self.grid.width(), self.grid.height()), locked.params().clone())?;
+        let mut fresh =
+            self.judging.fresh((self.grid.width(), self.grid.height()), locked.params().clone())?;
         fresh.set_pixels(locked.pixels());
         *locked = Judged { session: fresh.session.resume(job, checkpoint)?, record: fresh.record };
         Ok(())

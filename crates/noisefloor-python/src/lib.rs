@@ -57,7 +57,7 @@ mod _noisefloor {
     #[pymodule_export]
     use crate::stills::{PyJudged, judge};
     #[pymodule_export]
-    use crate::tone::PyToneTable;
+    use crate::tone::{PyLut, PyToneTable};
     #[pymodule_export]
     use crate::tune::{PyExcess, PyTuning, excess};
     #[pymodule_export]

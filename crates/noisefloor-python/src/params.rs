@@ -1,7 +1,7 @@
 //! Parameters, unchecked until a session or a picture uses them, and viewing conditions.
 
 use crate::errors::{ParameterError, Raise, whole};
-use crate::tone::PyToneTable;
+use crate::tone::{PyLut, PyToneTable, made};
 use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -76,7 +76,7 @@ impl PyViewing {
 /// tile: edge of a tile in pixels, 16 to 512; tiles of the last column and row have half to one and a half
 ///     times as many.
 /// tone_mapping: "reinhard" (None as well; with white, and exposure by key and the log-average of the picture), "srgb", or
-///     a ToneTable.
+///     a ToneTable or a Lut.
 /// exposure: a factor on radiance; 1 for "srgb" and tables by default. With "reinhard", frames of a film should have one.
 /// viewing: on which display the picture is seen, and from how far; a Viewing or its text.
 /// schedule: "spaced" by the expected need, "growing" by half of what a tile has (both in multiples of step),
@@ -111,14 +111,15 @@ impl ViewingLike {
     }
 }
 
-/// "reinhard", "srgb", or a table.
+/// "reinhard", "srgb", a table, or a file of one.
 #[derive(FromPyObject)]
 pub(crate) enum ToneLike {
     Table(PyToneTable),
+    Lut(PyLut),
     Name(String),
 }
 
-/// Tone mapping by its name, or a table; the first without any.
+/// Tone mapping by its name, or a table; by the first without any.
 pub(crate) fn tone_mapping(
     tone: Option<ToneLike>,
     key: f32,
@@ -133,11 +134,12 @@ pub(crate) fn tone_mapping(
     let tone = match tone {
         None => reinhard,
         Some(ToneLike::Table(table)) => ToneMapping::Custom { exposure, curve: table.curve },
+        Some(ToneLike::Lut(lut)) => ToneMapping::Custom { exposure, curve: lut.curve },
         Some(ToneLike::Name(name)) if name == "reinhard" => reinhard,
         Some(ToneLike::Name(name)) if name == "srgb" => ToneMapping::Srgb { exposure },
         Some(ToneLike::Name(name)) => {
             return Err(ParameterError::new_err(format!(
-                "{name:?} is no tone mapping: use \"reinhard\", \"srgb\" or a ToneTable"
+                "{name:?} is no tone mapping: use \"reinhard\", \"srgb\", a ToneTable or a Lut"
             )));
         }
     };
@@ -245,7 +247,7 @@ impl PyParams {
                 arguments.set_item("exposure", short(*exposure))?;
             }
             ToneMapping::Custom { exposure, curve } => {
-                arguments.set_item("tone_mapping", PyToneTable::of(curve))?;
+                arguments.set_item("tone_mapping", made(py, curve)?)?;
                 arguments.set_item("exposure", short(*exposure))?;
             }
         }

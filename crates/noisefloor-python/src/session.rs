@@ -410,13 +410,8 @@ impl PySession {
         let judged = fresh(py, size, &judging, params.0, pixels)?;
         let checkpoint = Checkpoint::read(checkpoint).map_err(Raise::raise)?;
         let session = judged.session.resume(PICKLED, checkpoint).map_err(Raise::raise)?;
-        let judged = Mutex::new(Judged { session, ..judged });
-        Ok(Self {
-            grid: TileGrid::new(size.0, size.1, params.0.tile).map_err(Raise::raise)?,
-            judged,
-            judging,
-            pixels,
-        })
+        let grid = session.film().grid();
+        Ok(Self { judged: Mutex::new(Judged { session, ..judged }), judging, grid, pixels })
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -1,16 +1,50 @@
-//! How a picture is shown by more than a curve: a table of colours.
+//! How a picture is shown by more than a curve: a table of colours, or a file of one.
 
-use crate::errors::{ParameterError, SizeError, whole};
+use crate::errors::{ParameterError, PictureError, Raise, SizeError, file_error, whole};
+use crate::pickle::reduced;
 use noisefloor::Rgb;
 use noisefloor::display::{ToneCurve, ToneTable, ToneTableError};
+use noisefloor_image::{LutInput, LutInputError, parse_cube, read_cube};
 use numpy::ndarray::Array4;
 use numpy::{IntoPyArray, PyArray1, PyArray4, PyArrayMethods, PyReadonlyArray4};
+use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyType};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// All tables made so far by the digest of their curves, which are kept as long: parameters hold only the curve.
-static TABLES: Mutex<BTreeMap<String, Arc<ToneTable>>> = Mutex::new(BTreeMap::new());
+/// What a curve of this module was made of.
+#[derive(Clone)]
+enum Origin {
+    Table(Arc<ToneTable>),
+    Lut(Arc<LutText>),
+}
+
+/// A `.cube` file.
+struct LutText {
+    text: Vec<u8>,
+    input: LutInput,
+}
+
+/// All that was made so far by the digest of its curve, which is kept as long: parameters hold only the curve.
+static MADE: Mutex<BTreeMap<String, Origin>> = Mutex::new(BTreeMap::new());
+
+fn keep(curve: &ToneCurve, origin: Origin) {
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(curve.digest()).or_insert(origin);
+}
+
+/// The object that this module has made the curve of; None if it has not.
+pub(crate) fn made<'py>(py: Python<'py>, curve: &ToneCurve) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let made = MADE.lock().unwrap_or_else(PoisonError::into_inner).get(&curve.digest()).cloned();
+    let curve = curve.clone();
+    Ok(match made {
+        None => None,
+        Some(Origin::Table(table)) => Some(PyToneTable { curve, table }.into_bound_py_any(py)?),
+        Some(Origin::Lut(file)) => Some(PyLut { curve, file }.into_bound_py_any(py)?),
+    })
+}
 
 /// ToneTable(table, toe=0.001, top=1000.0) --
 ///
@@ -43,14 +77,6 @@ fn raise(error: ToneTableError) -> PyErr {
     }
 }
 
-impl PyToneTable {
-    /// The table of a curve that this module has made; None if it has not.
-    pub(crate) fn of(curve: &ToneCurve) -> Option<Self> {
-        let tables = TABLES.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(Self { curve: curve.clone(), table: Arc::clone(tables.get(&curve.digest())?) })
-    }
-}
-
 #[pymethods]
 impl PyToneTable {
     #[new]
@@ -73,8 +99,8 @@ impl PyToneTable {
         let values: Vec<Rgb> = values.as_chunks().0.to_vec();
         let table = Arc::new(ToneTable::new(edge, toe, top, values).map_err(raise)?);
         let curve = ToneTable::clone(&table).into_tone_curve();
-        let mut tables = TABLES.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(Self { curve: curve.clone(), table: Arc::clone(tables.entry(curve.digest()).or_insert(table)) })
+        keep(&curve, Origin::Table(Arc::clone(&table)));
+        Ok(Self { curve, table })
     }
 
     /// radiances(n, toe=0.001, top=1000.0) --
@@ -103,5 +129,62 @@ impl PyToneTable {
     fn __repr__(&self) -> String {
         let ((toe, top), digest) = (self.table.range(), self.curve.digest());
         format!("<ToneTable {} of edge {}, toe {toe}, top {top}>", &digest[..8], self.table.edge())
+    }
+}
+
+/// Lut(path, input="linear") --
+///
+/// How a picture is shown, as a .cube file: a 1D LUT, a 3D LUT, or a 1D one before a 3D one. What it returns is taken for
+/// sRGB-encoded display values. The verdicts are those of `--tone-mapping lut:FILE`.
+///
+/// path: of the file. input: how radiance is encoded before it: "linear", "srgb", "acescct", or "log2:LOW,HIGH" for stops
+///     from middle grey (0.18) that become 0 and 1. Files are kept until the program ends, each once.
+///
+/// Raises OSError if the file cannot be read, PictureError if it is broken, ParameterError for another input.
+#[pyclass(frozen, eq, name = "Lut", module = "noisefloor", from_py_object)]
+#[derive(Clone)]
+pub(crate) struct PyLut {
+    pub(crate) curve: ToneCurve,
+    file: Arc<LutText>,
+}
+
+impl PartialEq for PyLut {
+    fn eq(&self, other: &Self) -> bool {
+        self.curve == other.curve
+    }
+}
+
+impl PyLut {
+    fn of(text: Vec<u8>, input: &str) -> PyResult<Self> {
+        let input: LutInput =
+            input.parse().map_err(|error: LutInputError| ParameterError::new_err(error.to_string()))?;
+        let lut = parse_cube(&text).map_err(|error| PictureError::new_err(error.to_string()))?;
+        let (curve, file) = (lut.into_tone_curve(input), Arc::new(LutText { text, input }));
+        keep(&curve, Origin::Lut(Arc::clone(&file)));
+        Ok(Self { curve, file })
+    }
+}
+
+#[pymethods]
+impl PyLut {
+    #[new]
+    #[pyo3(signature = (path, input = "linear"))]
+    fn new(path: PathBuf, input: &str) -> PyResult<Self> {
+        // Checked as a file is, for its length among others
+        read_cube(&path).map_err(Raise::raise)?;
+        Self::of(std::fs::read(&path).map_err(|error| file_error(&path, &error))?, input)
+    }
+
+    #[classmethod]
+    fn _restore(_class: &Bound<'_, PyType>, text: Vec<u8>, input: &str) -> PyResult<Self> {
+        Self::of(text, input)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        reduced::<Self>(py, (PyBytes::new(py, &self.file.text), self.file.input.to_string()))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Lut {} of {} light>", &self.curve.digest()[..8], self.file.input)
     }
 }

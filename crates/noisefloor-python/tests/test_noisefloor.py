@@ -920,6 +920,42 @@ class Settings(unittest.TestCase):
             with self.assertRaises(error):
                 nf.ToneTable(bad)
 
+    def test_a_file_of_a_lut_shows_what_it_says(self):
+        """Half of sRGB, by a curve of one dimension; and red and blue exchanged."""
+        pair = self.noisy(1, 0.05), self.noisy(2, 0.05)
+        with tempfile.TemporaryDirectory() as folder:
+            curve, cube = (pathlib.Path(folder) / name for name in ("curve.cube", "swap.cube"))
+            values = np.linspace(0, 0.5, 33)
+            curve.write_text("LUT_1D_SIZE 33\n" + "".join(f"{v:.6f} {v:.6f} {v:.6f}\n" for v in values))
+            corners = [(r, g, b) for b in (0, 1) for g in (0, 1) for r in (0, 1)]
+            cube.write_text("LUT_3D_SIZE 2\n" + "".join(f"{b} {g} {r}\n" for r, g, b in corners))
+            half, swap = nf.Lut(curve, "srgb"), nf.Lut(cube, "srgb")
+            broken = pathlib.Path(folder) / "broken.cube"
+            broken.write_text("LUT_3D_SIZE 2\n0 0 0\n")
+            with self.assertRaises(nf.PictureError):
+                nf.Lut(broken)
+            with self.assertRaises(nf.ParameterError):
+                nf.Lut(curve, "log3")
+        with self.assertRaises(FileNotFoundError):
+            nf.Lut("none.cube")
+        # The files are gone, and not needed
+        ratio = lambda tone, pair=pair: nf.excess(*pair, params=nf.Params(tone_mapping=tone)).ratio
+        exchanged = [picture[..., ::-1] for picture in pair]
+        self.assertAlmostEqual(ratio(swap) / ratio("srgb", exchanged), 1, delta=1e-4)
+        self.assertNotAlmostEqual(ratio(swap) / ratio("srgb"), 1, delta=1e-3)
+        # The same display values by a table, whose axes are others
+        axis = nf.ToneTable.radiances(65, 0.001, 1)
+        shown = 0.5 * np.where(axis <= 0.0031308, 12.92 * axis, 1.055 * axis ** (1 / 2.4) - 0.055)
+        blue, green, red = np.meshgrid(shown, shown, shown, indexing="ij")
+        table = nf.ToneTable(np.stack([red, green, blue], -1), 0.001, 1)
+        self.assertAlmostEqual(ratio(half) / ratio(table), 1, delta=0.02)
+        self.assertNotAlmostEqual(ratio(half) / ratio("srgb"), 1, delta=0.06)
+        for tone in (half, swap):
+            self.assertEqual(pickle.loads(pickle.dumps(tone)), tone)
+            params = nf.Params(tone_mapping=tone)
+            self.assertEqual(pickle.loads(pickle.dumps(params)), params)
+        self.assertNotEqual(half, swap)
+
 
 if __name__ == "__main__":
     unittest.main()
