@@ -239,7 +239,12 @@ fn a_checkpoint_of_another_build_is_refused() {
     std::fs::set_permissions(&other, std::fs::Permissions::from_mode(0o755)).unwrap();
     let mut resume = std::process::Command::new(&other);
     resume.args(short(text(&out), &["--resume"])).env("XDG_CONFIG_HOME", "/nowhere");
-    let said = resume.output().unwrap();
+    // A child that another test has forked meanwhile holds the file open for writing until it is a program of its own
+    let run = || match resume.output() {
+        Err(error) if error.kind() == std::io::ErrorKind::ExecutableFileBusy => None,
+        said => Some(said.unwrap()),
+    };
+    let said = wait_for("the copy", run);
     assert_eq!(said.status.code(), Some(1));
     assert!(stderr(&said).contains("`the build of this program` has changed"), "{}", stderr(&said));
 }
