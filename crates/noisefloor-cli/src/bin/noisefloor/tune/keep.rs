@@ -82,7 +82,7 @@ impl Keep {
             Canvas::of_picture(*width, &encoded)
         };
         shown(mean).save(path("image.png"))?;
-        Ok(match denoised {
+        match denoised {
             Some(denoised) => {
                 write_exr(path("image-denoised.exr"), &RenderLayers::rgb(*width, *height, denoised))?;
                 let shown = shown(denoised);
@@ -90,6 +90,7 @@ impl Keep {
                 draw_field(&shown, map, &ERROR_SCALE).save(path("denoised-error.png"))?;
             }
             None => draw_field(&shown(mean), map, &NOISE_SCALE).save(path("noise.png"))?,
-        })
+        }
+        Ok(())
     }
 }
