@@ -86,7 +86,9 @@ def pictures(folder):
         if job.name == "reference" or not seconds.exists():
             continue
         _, spp = shown.load(job)
-        cost = json.loads(seconds.read_text())["seconds"]
+        kept = json.loads(seconds.read_text())
+        # Of a run that was interrupted, only its end is known
+        cost = math.nan if kept["resumed"] else kept["seconds"]
         if job.name != "oracle-denoised":
             yield job.name, shown.shown(shown.load(job)[0], gain), spp.mean(), cost
         denoised = job / "image-denoised.exr"
