@@ -129,7 +129,11 @@ fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
     written?;
     if !quiet {
         output.summarise(driver.session(), driver.clock(), driver.source().as_ref())?;
-        if matches!(job.criterion, CriterionJob::Oracle { .. }) && driver.session().is_done() {
+        // Of a render that was cut short, nobody knows what it would have taken
+        let mut reasons = driver.session().stops().map(|stop| stop.reason);
+        let is_whole = reasons.all(|reason| matches!(reason, StopReason::Converged | StopReason::MaxSpp));
+        let is_done = driver.session().is_done() && is_whole;
+        if is_done && matches!(job.criterion, CriterionJob::Oracle { .. }) {
             denoised::say_what_it_would_save(driver.session(), began.elapsed())?;
         }
     }
