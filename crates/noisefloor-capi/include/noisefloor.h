@@ -20,7 +20,7 @@
 // Pointers. A pointer that is NULL where it must not be is NF_STATUS_NULL_POINTER. Beside a pointer to an
 // array goes the number of its elements, which is checked. What cannot be checked: pointers must lead to as
 // many elements as said, or to one object. Text ends with a zero byte and is UTF-8. The library keeps no pointer
-// after a call, and owns what it returns.
+// after a call, but for denoise and user of nf_session_new_denoised, and owns what it returns.
 //
 // Pictures are rows from the top, pixels from the left, three floats a pixel: linear red, green and blue with
 // the primaries of Rec. 709. Floats that are not finite do not count as samples.
@@ -327,7 +327,7 @@ NfStatus nf_session_judge(const NfSession *session,
 // As nf_session_new, for pictures that are denoised before anyone sees them: a tile is done when what denoise makes of
 // the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, by the
 // vision model; nobody has been asked about denoised pictures. Both halves of the samples are denoised apart, so a
-// verdict takes two calls, on a thread that calls nf_session_judge: params is NULL for the defaults with the schedule
+// verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 // NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 // NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
 // independent of each other.

@@ -35,7 +35,7 @@ pub(crate) struct DenoisedBy {
     first_hits: Option<Arc<[FirstHits; 2]>>,
 }
 
-// SAFETY: `user` is only handed back, and the header says that any thread may do so.
+// SAFETY: `user` is only handed back, and the header says that any thread that judges may do so.
 unsafe impl Send for DenoisedBy {}
 // SAFETY: whoever shares it can only copy it.
 unsafe impl Sync for DenoisedBy {}
@@ -105,7 +105,7 @@ impl Denoiser for DenoisedBy {
 /// As nf_session_new, for pictures that are denoised before anyone sees them: a tile is done when what denoise makes of
 /// the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, by the
 /// vision model; nobody has been asked about denoised pictures. Both halves of the samples are denoised apart, so a
-/// verdict takes two calls, on a thread that calls nf_session_judge: params is NULL for the defaults with the schedule
+/// verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 /// NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 /// NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
 /// independent of each other.
