@@ -47,7 +47,9 @@ mod estimate;
 mod oidn;
 mod record;
 
-pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising};
+pub use criterion::{
+    DEFAULT_JODS_LOST, DenoisedQuality, ESTIMATE_ERRS_BY, spp_with_denoising, spp_without_denoising,
+};
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
 pub use estimate::{DenoisedError, DenoisedHalves};
 #[cfg(feature = "oidn")]

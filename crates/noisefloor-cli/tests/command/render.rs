@@ -3,7 +3,7 @@ use noisefloor_image::{Picture, read_exr, read_picture};
 use std::path::Path;
 use tempfile::tempdir;
 
-const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar";
+const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar,jods_lost";
 
 // Long: one run, looked at from all sides
 #[test]

@@ -4,9 +4,10 @@ use noisefloor::{
     criterion::CriterionError, source::FirstHits,
 };
 use noisefloor_denoise::{
-    AuxiliaryPictures, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture, spp_with_denoising,
-    spp_without_denoising,
+    AuxiliaryPictures, DenoiseError, DenoisedError, DenoisedQuality, Denoiser, ESTIMATE_ERRS_BY,
+    NoisyPicture, spp_with_denoising, spp_without_denoising,
 };
+use noisefloor_vision::{VisionModel, VisionWorkspace};
 use std::sync::{Arc, Mutex};
 
 /// Deviation of one sample.
@@ -26,9 +27,17 @@ fn session<D: Denoiser>(denoiser: D) -> Session<DenoisedQuality<D>> {
 
 /// Renders, and returns the stops' samples per pixel: 0 and 3 are striped, the others plain.
 fn run<D: Denoiser>(session: &mut Session<DenoisedQuality<D>>) -> Result<Vec<u64>, SessionError> {
+    run_with(session, 0)
+}
+
+/// The same with other noise.
+fn run_with<D: Denoiser>(
+    session: &mut Session<DenoisedQuality<D>>,
+    run: u64,
+) -> Result<Vec<u64>, SessionError> {
     while !session.is_done() {
         for request in session.requests() {
-            let seed = 1000 * request.first + request.tile.index as u64;
+            let seed = (run << 32) + 1000 * request.first + request.tile.index as u64;
             let picture = noisy(seed, NOISE / (request.spp as f32).sqrt());
             let tile: Vec<_> = request.tile.rows(SIZE.0).flatten().map(|i| picture[i]).collect();
             session.push(request.tile.index, request.spp, &tile).unwrap();
@@ -52,8 +61,32 @@ fn a_plain_wall_is_done_sooner_when_denoised_and_a_smeared_one_is_not() {
     let record = denoised.criterion().record();
     let record = record.lock().unwrap();
     assert_eq!(record.error.as_ref().unwrap().size(), SIZE);
-    assert!(record.jods_lost[2] <= 0.1 && record.jods_lost[0] > 0.1, "{:?}", record.jods_lost);
+    let allowed = 0.1 / ESTIMATE_ERRS_BY;
+    assert!(record.jods_lost[2] <= allowed && record.jods_lost[0] > allowed, "{:?}", record.jods_lost);
     assert!(record.verdicts > 0 && record.seconds > 0.0);
+}
+
+/// A tile stops where its estimate errs to the low side: the margin makes up for that.
+#[test]
+fn nineteen_of_twenty_tiles_that_stop_have_lost_no_more_than_is_allowed() {
+    let (mut stopped, mut more, mut worst) = (0, 0, 0.0_f64);
+    for seed in 1..=10 {
+        let mut session = session(Simple::Bilateral(0.1));
+        run_with(&mut session, seed).unwrap();
+        let display = session.display_so_far();
+        let denoised = Simple::Bilateral(0.1).of(&session.film().image());
+        let error = DenoisedError::known(SIZE, &denoised, &truth(), &display).unwrap();
+        let (eyes, mut room) = (VisionModel::new(&session.params().viewing), VisionWorkspace::default());
+        for stop in session.stops().filter(|stop| stop.reason == StopReason::Converged) {
+            let lost = error.jods_lost(stop.tile, &eyes, &mut room).unwrap();
+            (stopped, more, worst) = (stopped + 1, more + usize::from(lost > 0.1), worst.max(lost));
+        }
+    }
+    println!("{more} of {stopped} have lost more, at most {worst}");
+    assert!(stopped >= 20);
+    // Two standard deviations of a binomial distribution above one in twenty
+    let expected = stopped as f64 / 20.0;
+    assert!((more as f64) <= expected + 2.0 * (expected * 0.95).sqrt(), "{more} of {stopped}, worst {worst}");
 }
 
 /// A film of the striped wall with so many samples per pixel everywhere.
@@ -79,7 +112,8 @@ fn the_need_without_denoising_is_that_of_the_noisy_picture() {
     for (spp, tolerance) in [(40, 0.4), (200, 0.2)] {
         let session = sampled(Simple::Fails, spp);
         let (display, viewing) = (session.params().tone_mapping.settle(&truth()), session.params().viewing);
-        let found = spp_without_denoising(session.film(), &display, &truth(), viewing, 0.1).unwrap();
+        let limit = 0.1 / ESTIMATE_ERRS_BY;
+        let found = spp_without_denoising(session.film(), &display, &truth(), viewing, limit).unwrap();
         assert!((found / needed).ln().abs() < tolerance, "{found} by {spp}, and {needed}");
     }
 }

@@ -196,7 +196,8 @@ impl Output {
     ) -> anyhow::Result<()> {
         self.forget_earlier()?;
         let tiles = tiles::states(session);
-        write_csv(self.path("stops.csv"), tiles.iter().map(TileState::row))?;
+        let lost = self.denoised.as_ref().map(Denoised::jods_lost).unwrap_or_default();
+        write_csv(self.path("stops.csv"), tiles.iter().map(|tile| tile.row(&lost)))?;
         write_csv(self.path("timeline.csv"), self.timeline.iter())?;
         // The report goes before a checkpoint is removed: whatever is killed in between, one of them says
         // how far the render is. While a picture is missing, the render is not done, even if all tiles are

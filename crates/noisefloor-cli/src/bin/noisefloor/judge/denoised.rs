@@ -8,7 +8,7 @@ use noisefloor::{
     stills::{SnapshotPair, Still},
 };
 use noisefloor_cli::say::{note, say, say_json};
-use noisefloor_denoise::{DenoisedError, DenoisedHalves};
+use noisefloor_denoise::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY};
 use noisefloor_image::check_writable;
 use noisefloor_image::maps::{Canvas, draw_field};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
@@ -108,7 +108,8 @@ fn judge(job: &DenoisedJob, error: &DenoisedError) -> anyhow::Result<Vec<Row>> {
     let mut row = |tile: Tile| {
         let jods_lost = error.jods_lost(tile, &eyes, &mut room)?;
         let Tile { index, x, y, width, height } = tile;
-        Ok(Row { tile: index, x, y, width, height, jods_lost, converged: jods_lost <= job.lost })
+        let converged = jods_lost * ESTIMATE_ERRS_BY <= job.lost;
+        Ok(Row { tile: index, x, y, width, height, jods_lost, converged })
     };
     grid.tiles().map(&mut row).collect()
 }
@@ -129,6 +130,11 @@ fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
         let verdict = if *converged { "converged" } else { "error seen" };
         say!("{tile:4} {x:5} {y:5} {:>8} {jods_lost:8.3}  {verdict}", format!("{width}×{height}"))?;
     }
-    say!("{converged_tiles} of {} denoised tiles have lost at most {} JOD", rows.len(), job.lost)?;
+    say!(
+        "{converged_tiles} of {} denoised tiles have lost at most {} JOD: 19 of 20 with an estimate of up to {:.3}",
+        rows.len(),
+        job.lost,
+        job.lost / ESTIMATE_ERRS_BY
+    )?;
     Ok(say!("the limit is the vision model's: nobody has been asked about denoised tiles")?)
 }

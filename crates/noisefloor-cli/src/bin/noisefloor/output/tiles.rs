@@ -23,6 +23,8 @@ pub(super) struct StopRow {
     probability: Option<f32>,
     reason: String,
     unfamiliar: bool,
+    /// With a denoiser: by the estimate when the tile was last judged.
+    jods_lost: Option<f64>,
 }
 
 /// All tiles, in their order.
@@ -57,11 +59,12 @@ impl TileState {
         !self.open && (reason.is_final() || reason == StopReason::SourceExhausted)
     }
 
-    /// A line of the table.
-    pub(super) fn row(&self) -> StopRow {
+    /// A line of the table. `lost` has, for each tile, what the denoised picture has lost there.
+    pub(super) fn row(&self, lost: &[f64]) -> StopRow {
         let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
         let (tile, reason) = (index, self.reason());
-        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar }
+        let jods_lost = lost.get(index).copied().filter(|lost| lost.is_finite());
+        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar, jods_lost }
     }
 
     fn mark(&self) -> TileMark {
