@@ -30,6 +30,9 @@ mod numerics;
 /// What people said of real renders.
 #[cfg(test)]
 mod people;
+/// Where two features meet.
+#[cfg(test)]
+mod regressions;
 /// LuxCore and Cycles, where they are installed.
 #[cfg(test)]
 mod renderers;
