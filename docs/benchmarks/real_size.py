@@ -13,6 +13,7 @@ which has nearly none, but may have lost a little texture.
 Seconds are of the processor, the denoiser's process included. Needs numpy, OpenEXR and pillow."""
 import argparse
 import csv
+import itertools
 import json
 import math
 import os
@@ -40,6 +41,7 @@ def jobs(args):
     """What is rendered of a scene: folder and options."""
     oidn = ["--denoise", "oidn"]
     yield "oracle-denoised", oidn
+    yield "oracle-denoised-2", [*oidn, "--seed", "2"]
     for spp in UNIFORM:
         yield f"uniform-{spp}", [*oidn, "--min-spp", str(spp), "--max-spp", str(spp)]
     yield "oracle", ["--max-spp", str(args.reference // 2)]
@@ -89,17 +91,18 @@ def pictures(folder):
         kept = json.loads(seconds.read_text())
         # Of a run that was interrupted, only its end is known
         cost = math.nan if kept["resumed"] else kept["seconds"]
-        if job.name != "oracle-denoised":
+        meant = job.name.startswith("oracle-denoised")
+        if not meant:
             yield job.name, shown.shown(shown.load(job)[0], gain), spp.mean(), cost
         denoised = job / "image-denoised.exr"
         if denoised.exists():
-            label = job.name if job.name.endswith("-denoised") else f"{job.name}-denoised"
+            label = job.name if meant else f"{job.name}-denoised"
             yield label, shown.shown(shown.load(f"{denoised}:0")[0], gain), spp.mean(), cost
 
 
 def measure(args, lost=None):
     rows = csv.writer(sys.stdout)
-    rows.writerow("scene picture spp seconds worst median worst_denoised median_denoised".split())
+    rows.writerow("scene picture spp seconds worst most median worst_denoised most_denoised median_denoised".split())
     for folder in sorted(pathlib.Path(args.out).iterdir()):
         if not (folder / "reference" / "processor-seconds.json").exists() or getattr(args, "scene", folder.name) != folder.name:
             continue
@@ -111,7 +114,7 @@ def measure(args, lost=None):
                 numbers = [spp, seconds]
                 for truth in references:
                     values = [one(picture.crop(s), truth.crop(s)) for s in squares(truth.height, truth.width)]
-                    numbers += [max(values), np.median(values)]
+                    numbers += [max(values), np.quantile(values, 0.95), np.median(values)]
                 rows.writerow([folder.name, label, *(f"{v:.3f}" for v in numbers)])
                 sys.stdout.flush()
 
@@ -138,28 +141,34 @@ def table(args):
     for row in csv.DictReader(open(args.rows)):
         numbers = {key: float(value) for key, value in row.items() if key not in ("scene", "picture")}
         scenes.setdefault(row["scene"], {})[row["picture"]] = numbers
-    kinds = (("denoised", "oracle-denoised", "-denoised"), ("noisy", "oracle", ""))
-    for (kind, oracle, suffix), by in ((kind, by) for kind in kinds for by in ("worst", "worst_denoised")):
-        median = by.replace("worst", "median")
-        print(f"\n| {kind}, {'denoised reference' if by != 'worst' else 'reference'} | oracle: spp, s; worst, median | " + " | ".join(f"uniform {n}" for n in UNIFORM)
-              + " | uniform until as good |")
-        print("|---" * (3 + len(UNIFORM)) + "|")
-        ratios = []
+    runs = {"denoised": ["oracle-denoised", "oracle-denoised-2"], "without the margin": ["oracle-denoised-without-margin"],
+            "noisy": ["oracle"]}
+    for (kind, oracle), reference in itertools.product(runs.items(), ("_denoised", "")):
+        suffix = "" if kind == "noisy" else "-denoised"
+        print(f"\n| {kind}, {'denoised reference' if reference else 'reference'} | spp | seconds | worst, most of 20, median | "
+              + " | ".join(f"uniform {n}" for n in UNIFORM) + " | as good by the worst | by most of 20 |")
+        print("|---" * (6 + len(UNIFORM)) + "|")
+        ratios = {"worst": [], "most": []}
         for scene, found in scenes.items():
-            if oracle not in found:
+            ours = [found[name] for name in oracle if name in found]
+            if not ours:
                 continue
-            ours = found[oracle]
-            series = [(n, found[f"uniform-{n}{suffix}"][by]) for n in UNIFORM if f"uniform-{n}{suffix}" in found]
-            spp = as_good(series, ours[by])
-            bound = f"> {series[-1][0]}" if series[-1][1] > ours[by] else f"< {series[0][0]}"
-            if spp:
-                ratios.append(spp / ours["spp"])
-            cell = f"{spp:.0f}, ×{spp / ours['spp']:.2f}" if spp else bound
-            cells = [f"{lost:.2f}" for _, lost in series]
-            print(f"| {scene} | {ours['spp']:.0f}, {ours['seconds']:.0f}; {ours[by]:.2f}, {ours[median]:.2f} | "
-                  + " | ".join(cells) + f" | {cell} |")
-        if ratios:
-            print(f"\nmedian of the {len(ratios)} that are bracketed: ×{np.median(ratios):.2f}, lowest ×{min(ratios):.2f}")
+            mean = lambda key: np.mean([one[key] for one in ours])
+            uniform = [(n, found[f"uniform-{n}{suffix}"]) for n in UNIFORM if f"uniform-{n}{suffix}" in found]
+            cells = [f"{row['worst' + reference]:.2f}, {row['most' + reference]:.2f}" for _, row in uniform]
+            for by, all_ratios in ratios.items():
+                series = [(n, row[by + reference]) for n, row in uniform]
+                lost = mean(by + reference)
+                spp = as_good(series, lost)
+                cells.append(f"{spp:.0f}, ×{spp / mean('spp'):.2f}" if spp else
+                             f"> {series[-1][0]}" if series[-1][1] > lost else f"< {series[0][0]}")
+                all_ratios += [spp / mean("spp")] if spp else []
+            lost = " / ".join(", ".join(f"{one[key + reference]:.2f}" for key in ("worst", "most", "median")) for one in ours)
+            spps = " / ".join(f"{one['spp']:.0f}" for one in ours)
+            print(f"| {scene} | {spps} | {np.nanmean([one['seconds'] for one in ours]):.0f} | {lost} | " + " | ".join(cells) + " |")
+        for by, found in ratios.items():
+            if found:
+                print(f"\nby {by}: median of the {len(found)} that are bracketed ×{np.median(found):.2f}, lowest ×{min(found):.2f}")
 
 
 def main():
