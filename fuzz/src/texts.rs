@@ -1,8 +1,8 @@
 //! Tables, replies of renderers, and what browsers send.
 
 use noisefloor::Params;
+use noisefloor::display::parse_cube;
 use noisefloor_eyes::Eyes;
-use noisefloor_image::parse_cube;
 use noisefloor_learn::{read_table, write_table};
 use noisefloor_study::{Beginning, Envelope, ParticipantSession, Plan, Study, grids, parse_code};
 use std::sync::Arc;

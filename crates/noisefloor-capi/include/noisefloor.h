@@ -123,6 +123,9 @@ typedef struct NfOracle NfOracle;
 // Film, oracle and limits of one picture.
 typedef struct NfSession NfSession;
 
+// How radiance is displayed, for NfParams: a table, or a .cube file.
+typedef struct NfTone NfTone;
+
 // The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
 typedef struct NfTuning NfTuning;
 
@@ -147,7 +150,7 @@ typedef struct {
     float key;
     // For NF_TONE_REINHARD: smallest exposed luminance that becomes white, or 0 (default) for none.
     float white;
-    // For NF_TONE_SRGB: factor on radiance, above 0. Default: 1.
+    // For NF_TONE_SRGB, and with tone: factor on radiance, above 0. Default: 1.
     float exposure;
     // Whose thresholds, as a line T' = slope * T + offset from those of the observers in the training data.
     // slope is at least 0. Default: 1.
@@ -158,6 +161,9 @@ typedef struct {
     // "ppd=60,peak=300,black=0.3,ambient=100"; "desk,fps=24" for a frame of a film whose noise is new in every
     // frame. NULL (default) for "desk". Read by nf_session_new only.
     const char *viewing;
+    // A tone mapping of your own, of nf_tone_of_cube or nf_tone_of_table; tone_mapping counts no more then. NULL
+    // (default) for none. Read when the parameters are.
+    const NfTone *tone;
 } NfParams;
 
 // A rectangle of pixels that stops as a whole. Tiles lie in rows from the top left.
@@ -346,6 +352,27 @@ NfStatus nf_session_new_denoised(size_t width,
 NfStatus nf_session_jods_lost(const NfSession *session,
                               double *lost,
                               size_t capacity);
+
+// A .cube file: a 1D LUT, a 3D LUT, or a 1D one before a 3D one. text is its content, bytes long. input says how
+// radiance is encoded before it: "linear" (also NULL), "srgb", "acescct", or "log2:LOW,HIGH" for stops from middle grey
+// (0.18) that become 0 and 1. What it returns is taken for sRGB-encoded display values. The caller frees it with
+// nf_tone_free, parameters and sessions keep what they need.
+NfStatus nf_tone_of_cube(const char *text,
+                         size_t bytes,
+                         const char *input,
+                         NfTone **tone);
+
+// A table: see nf_session_set_tone_table. The caller frees it with nf_tone_free, parameters and sessions keep what they
+// need.
+NfStatus nf_tone_of_table(float toe,
+                          float top,
+                          const float *table,
+                          size_t floats,
+                          size_t edge,
+                          NfTone **tone);
+
+// Frees a tone mapping. NULL is ignored, a second time is NF_STATUS_HANDLE.
+NfStatus nf_tone_free(NfTone *tone);
 
 // Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
 // tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red

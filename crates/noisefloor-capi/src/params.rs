@@ -1,7 +1,9 @@
 //! Parameters of a session.
 
 use crate::border;
+use crate::handle;
 use crate::status::{Failure, NfStatus, guard};
+use crate::tone::NfTone;
 use noisefloor::{Audience, Params, Schedule, ToneMapping, Viewing};
 use std::ffi::c_char;
 
@@ -41,7 +43,7 @@ pub struct NfParams {
     pub key: f32,
     /// For NF_TONE_REINHARD: smallest exposed luminance that becomes white, or 0 (default) for none.
     pub white: f32,
-    /// For NF_TONE_SRGB: factor on radiance, above 0. Default: 1.
+    /// For NF_TONE_SRGB, and with tone: factor on radiance, above 0. Default: 1.
     pub exposure: f32,
     /// Whose thresholds, as a line T' = slope * T + offset from those of the observers in the training data.
     /// slope is at least 0. Default: 1.
@@ -52,6 +54,9 @@ pub struct NfParams {
     /// "ppd=60,peak=300,black=0.3,ambient=100"; "desk,fps=24" for a frame of a film whose noise is new in every
     /// frame. NULL (default) for "desk". Read by nf_session_new only.
     pub viewing: *const c_char,
+    /// A tone mapping of your own, of nf_tone_of_cube or nf_tone_of_table; tone_mapping counts no more then. NULL
+    /// (default) for none. Read when the parameters are.
+    pub tone: *const NfTone,
 }
 
 /// Fills in the defaults.
@@ -83,6 +88,7 @@ impl Default for NfParams {
             audience_slope: audience.slope,
             audience_offset: audience.offset,
             viewing: std::ptr::null(),
+            tone: std::ptr::null(),
         }
     }
 }
@@ -104,6 +110,10 @@ impl NfParams {
         };
         let white = (self.white != 0.0).then_some(self.white);
         let tone_mapping = match self.tone_mapping {
+            _ if !self.tone.is_null() => {
+                let curve = handle::get(self.tone)?.0.clone();
+                ToneMapping::Custom { exposure: self.exposure, curve }
+            }
             NF_TONE_REINHARD => ToneMapping::Reinhard { key: self.key, white },
             NF_TONE_SRGB => ToneMapping::Srgb { exposure: self.exposure },
             other => return Err(unknown("tone mapping", other)),

@@ -11,8 +11,10 @@ use crate::session::*;
 use crate::status::*;
 use crate::tone::*;
 use crate::tune::*;
-use noisefloor::{Oracle, Params, Rgb, Session, Tile, criterion::CriterionError};
-use std::ffi::{CStr, CString, c_void};
+use noisefloor::display::{ToneTable, parse_cube};
+use noisefloor::tune::PicturePair;
+use noisefloor::{Oracle, Params, Rgb, Session, Tile, ToneMapping, criterion::CriterionError};
+use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
 
 mod denoise;
@@ -356,6 +358,84 @@ fn a_tone_table_shows_what_it_says() {
     assert!(near < 0.02 && far > 2.0 * near, "{near} {far}");
 }
 
+/// A `.cube` file and a table make the verdicts that they make in Rust, of sessions and of pairs of pictures.
+#[test]
+fn tone_mappings_of_ones_own_judge_as_in_rust() {
+    let text = "LUT_1D_SIZE 3\nLUT_3D_SIZE 2\n0 0 0\n.3 .4 .5\n1 1 1\n\
+                0 0 0\n1 0 0\n0 1 0\n1 .9 0\n0 0 .8\n1 0 1\n0 1 1\n1 1 1\n";
+    let table: Vec<f32> = (0..81).map(|i| ((i / 3 % 3) as f32 / 2.0).powf(0.5)).collect();
+    let lut = parse_cube(text.as_bytes()).unwrap().into_tone_curve("log2:-6,3".parse().unwrap());
+    let made = ToneTable::new(3, 0.01, 4.0, table.as_chunks().0.to_vec()).unwrap().into_tone_curve();
+    let mut found = Vec::new();
+    for (by_cube, curve) in [(true, lut), (false, made)] {
+        let mut tone = null_mut();
+        // SAFETY: text and an array of the sizes given, and a variable of this function.
+        let status = unsafe {
+            if by_cube {
+                nf_tone_of_cube(text.as_ptr().cast(), text.len(), c"log2:-6,3".as_ptr(), &mut tone)
+            } else {
+                nf_tone_of_table(0.01, 4.0, table.as_ptr(), table.len(), 3, &mut tone)
+            }
+        };
+        assert_eq!(status, NfStatus::Ok, "{}", message());
+        let shown = NfParams { tone, exposure: 0.7, ..params() };
+        let rust = Params::default().with_tile(EDGE).with_max_spp(400);
+        let rust = rust.with_tone_mapping(ToneMapping::Custom { exposure: 0.7, curve });
+
+        let mut expected = Session::new(WIDTH, HEIGHT, Oracle::bundled(), rust.clone()).unwrap();
+        let by_c = session(&shown);
+        for _ in 0..3 {
+            for request in expected.requests() {
+                let mean = render(request.tile, request.first, request.spp);
+                expected.push(request.tile.index, request.spp, mean.as_chunks().0).unwrap();
+            }
+            expected.judge().unwrap();
+            round(&by_c, 1);
+        }
+        let p = |tile| expected.verdict(tile).and_then(|verdict| verdict.probability).unwrap();
+        let probabilities: Vec<f32> = states(&by_c).iter().map(|state| state.probability).collect();
+        assert_eq!(probabilities, (0..probabilities.len()).map(p).collect::<Vec<_>>());
+
+        let whole = Tile { index: 0, x: 0, y: 0, width: WIDTH, height: HEIGHT };
+        let (a, b) = (render(whole, 0, 16), render(whole, 1, 16));
+        let pixels = [&a, &b].map(|picture| picture.as_chunks().0.to_vec());
+        let pair = PicturePair::new((WIDTH, HEIGHT), pixels, 128.0).unwrap();
+        let (in_rust, _) = pair.noise(&Oracle::bundled(), &rust.with_tile(64)).unwrap();
+        let (mut oracle, mut excess) = (null_mut(), NfExcess::default());
+        // SAFETY: living handles, arrays of the sizes given, and variables of this function.
+        unsafe {
+            assert_eq!(nf_oracle_bundled(0.95, &mut oracle), NfStatus::Ok);
+            let (width, height) = (WIDTH as u32, HEIGHT as u32);
+            let status =
+                nf_excess(oracle, &shown, width, height, a.as_ptr(), b.as_ptr(), a.len(), &mut excess);
+            assert_eq!(status, NfStatus::Ok, "{}", message());
+            assert_eq!(nf_oracle_free(oracle), NfStatus::Ok);
+        }
+        assert_eq!(excess.ratio, in_rust.ratio);
+        found.push(excess.ratio);
+
+        assert_eq!((nf_tone_free(tone), nf_tone_free(tone)), (NfStatus::Ok, NfStatus::Handle));
+        round(&by_c, 1); // the session does not need it any more
+        let mut late = null_mut();
+        // SAFETY: a pointer to parameters, and a variable of this function.
+        assert_eq!(
+            unsafe { nf_session_new(WIDTH, HEIGHT, null(), &shown, &mut late) },
+            NfStatus::NullPointer
+        );
+    }
+    assert!(found[0] != found[1] && found.iter().all(|ratio| *ratio > 0.0), "both show the same: {found:?}");
+    let broken = |text: &str, input: *const c_char| {
+        let mut tone = null_mut();
+        // SAFETY: text of the size given, and a variable of this function.
+        let status = unsafe { nf_tone_of_cube(text.as_ptr().cast(), text.len(), input, &mut tone) };
+        (status, tone.is_null(), message())
+    };
+    let (status, none, said) = broken("LUT_1D_SIZE 2\n0 0 0\n", null());
+    assert!(status == NfStatus::Argument && none && said.contains("asks for 2"), "{said}");
+    let (status, none, said) = broken(text, c"log3:1,2".as_ptr());
+    assert!(status == NfStatus::Argument && none && said.contains("no input of a LUT"), "{said}");
+}
+
 #[test]
 fn every_pointer_may_be_null_and_none_is_followed_then() {
     use NfStatus::NullPointer;
@@ -393,8 +473,12 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_checkpoint(null(), c"".as_ptr(), null_mut(), 0, &mut n),
             nf_session_restore(null(), c"".as_ptr(), null(), 0),
             nf_session_set_tone_table(null(), 1.0, 0.01, 4.0, null(), 24, 2),
+            nf_tone_of_cube(null(), 9, null(), &mut null_mut()),
+            nf_tone_of_table(0.01, 4.0, null(), 24, 2, &mut null_mut()),
+            nf_tone_of_cube(c"".as_ptr(), 0, null(), null_mut()),
         ];
-        assert_eq!(without_session, [NullPointer; 17]);
+        assert_eq!(without_session, [NullPointer; 20]);
+        assert_eq!(nf_tone_free(null_mut()), NfStatus::Ok);
         let without_place = [
             nf_session_tile(s, 0, null_mut()),
             nf_session_requests(s, null_mut(), 9, &mut n),

@@ -25,15 +25,14 @@
 use crate::bands::Plane;
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::DenoiseError;
-use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes, tune::Excess};
+use noisefloor::tune::{Excess, squares};
+use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes};
 use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 
 /// What two residuals have in common is averaged over this many pixels to each side: 4,225 pixels in all, so
 /// that the finest scale tells a bias of an eighth of the noise from none.
 const RADIUS: usize = 32;
-/// Edge of the squares of which the worst counts for a whole picture, in pixels: at a desk, 1.7°.
-const SQUARE: usize = 64;
 /// Scales that are told apart, from details of two pixels to those of 64; what is coarser is one more.
 const SCALES: u32 = 5;
 /// Residuals are cut here, as a share of the display's range: a firefly is as wrong as can be seen, and the
@@ -64,6 +63,17 @@ pub struct DenoisedError {
     /// Of each pixel, for its brightness; empty where that is not in question.
     light: Vec<Light>,
     display: Display,
+}
+
+/// How far a denoised picture is from what it may have lost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DenoisedExcess {
+    /// In its worst square.
+    pub worst: Excess,
+    /// In each of its [`squares`]: what is lost there over what may be lost.
+    pub squares: Vec<(Tile, f64)>,
+    /// JODs lost around each pixel, row-major.
+    pub map: Vec<f32>,
 }
 
 /// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves,
@@ -156,28 +166,23 @@ impl DenoisedError {
         self.part(tile).jods_lost_at(1.0, eyes, room)
     }
 
-    /// How far the worst square of 64 pixels is from having lost `lost` JODs, and the map of what is lost, row-major.
-    /// Squares overlap by half; those of a picture that is smaller are cut.
+    /// How far the worst of the picture's [`squares`] is from having lost `lost` JODs.
     ///
     /// # Errors
     /// [`VisionError`] if a side of the picture has less than two pixels.
-    pub fn excess(&self, lost: f64, viewing: &Viewing) -> Result<(Excess, Vec<f32>), VisionError> {
+    pub fn excess(&self, lost: f64, viewing: &Viewing) -> Result<DenoisedExcess, VisionError> {
         let eyes = VisionModel::new(viewing);
-        let places = |side: usize| {
-            let last = side.saturating_sub(SQUARE);
-            (0..last).step_by(SQUARE / 2).chain([last]).collect::<Vec<_>>()
+        let ratio = |room: &mut VisionWorkspace, square: Tile| {
+            Ok((square, self.jods_lost(Tile { index: 0, ..square }, &eyes, room)? / lost))
         };
-        let (columns, rows) = (places(self.size.0), places(self.size.1));
-        let corners: Vec<_> = rows.iter().flat_map(|&y| columns.iter().map(move |&x| (x, y))).collect();
-        let (width, height) = (SQUARE.min(self.size.0), SQUARE.min(self.size.1));
-        let square = |room: &mut VisionWorkspace, &(x, y): &(usize, usize)| {
-            Ok((self.jods_lost(Tile { index: 0, x, y, width, height }, &eyes, room)?, (x, y)))
-        };
-        let all = corners.par_iter().map_init(VisionWorkspace::default, square);
-        let all: Vec<(f64, (usize, usize))> = all.collect::<Result<_, _>>()?;
-        let (most, (x, y)) = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
-        let place = Some((x + width / 2, y + height / 2));
-        Ok((Excess { place, ..Excess::new(most / lost) }, self.map_of_jods_lost(&eyes)?))
+        let all = squares(self.size).into_par_iter().map_init(VisionWorkspace::default, ratio);
+        let squares: Vec<(Tile, f64)> = all.collect::<Result<_, _>>()?;
+        let worst = squares.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let (ratio, place) = worst.map_or((0.0, None), |(square, ratio)| {
+            (*ratio, Some((square.x + square.width / 2, square.y + square.height / 2)))
+        });
+        let worst = Excess { place, ..Excess::new(ratio) };
+        Ok(DenoisedExcess { worst, squares, map: self.map_of_jods_lost(&eyes)? })
     }
 
     /// The same of the whole, if the residual had `contrast` times its strength.

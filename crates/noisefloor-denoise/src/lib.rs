@@ -51,7 +51,7 @@ pub use criterion::{
     DEFAULT_JODS_LOST, DenoisedQuality, ESTIMATE_ERRS_BY, spp_with_denoising, spp_without_denoising,
 };
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
-pub use estimate::{DenoisedError, DenoisedHalves};
+pub use estimate::{DenoisedError, DenoisedExcess, DenoisedHalves};
 #[cfg(feature = "oidn")]
 pub use oidn::{OIDN, Oidn};
 pub use record::DenoisedRecord;

@@ -7,7 +7,8 @@
 //! - [`read_unread`]: what is ignored of a file: alpha and further layers.
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
 //!   all.
-//! - [`read_cube`]: a `.cube` LUT, and as a tone mapping ([`ColourLut::into_tone_curve`]).
+//! - [`read_cube`]: a `.cube` LUT, and as a tone mapping (`ColourLut::into_tone_curve` of
+//!   `noisefloor::display`).
 //! - `maps`, behind the feature of that name: numbers drawn over a picture, in colours, with a legend.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
 //! - [`running_means`], [`batches`]: which samples are in which file of a stack.
@@ -42,7 +43,6 @@ mod decode_png;
 mod error;
 mod facts;
 mod frames;
-mod lut;
 #[cfg(feature = "maps")]
 pub mod maps;
 mod open;
@@ -56,14 +56,13 @@ mod unread;
 mod write;
 
 pub use atomic::{check_writable, write_atomic};
-pub use cube::{CubeError, parse_cube, read_cube};
+pub use cube::read_cube;
 pub use decode_exr::read_exr;
 pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
 pub use error::{PictureError, StackError, WriteError};
 pub use facts::{SampleFacts, read_facts};
 pub use frames::{Frame, batches, running_means};
-pub use lut::{ColourLut, LutInput, LutInputError};
 pub use open::MAX_FILE_BYTES;
 pub use picture::{DisplayImage, LinearImage, Picture};
 pub use plane::Plane;

@@ -3,8 +3,8 @@
 use crate::errors::{ParameterError, PictureError, Raise, SizeError, file_error, whole};
 use crate::pickle::reduced;
 use noisefloor::Rgb;
-use noisefloor::display::{ToneCurve, ToneTable, ToneTableError};
-use noisefloor_image::{LutInput, LutInputError, parse_cube, read_cube};
+use noisefloor::display::{LutInput, LutInputError, ToneCurve, ToneTable, ToneTableError, parse_cube};
+use noisefloor_image::read_cube;
 use numpy::ndarray::Array4;
 use numpy::{IntoPyArray, PyArray1, PyArray4, PyArrayMethods, PyReadonlyArray4};
 use pyo3::IntoPyObjectExt;

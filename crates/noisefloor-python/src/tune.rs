@@ -5,9 +5,9 @@ use crate::errors::{CriterionError, ParameterError, PictureError, Raise, SizeErr
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
-use noisefloor::tune::{Ending, Excess, Knob, Next, PairError, PicturePair, Tuning};
-use noisefloor::{Oracle, Params, Rgb};
-use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedHalves};
+use noisefloor::tune::{Ending, Excess, Knob, Next, PairError, PicturePair, Tuning, squares};
+use noisefloor::{Oracle, Params, Rgb, Tile};
+use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedExcess, DenoisedHalves};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -21,6 +21,8 @@ pub(crate) struct PyExcess {
     excess: Excess,
     size: (usize, usize),
     map: Vec<f32>,
+    /// Squares, and what is wrong in each over what may be.
+    squares: Vec<(Tile, f64)>,
 }
 
 #[pymethods]
@@ -43,6 +45,15 @@ impl PyExcess {
     /// the JODs lost.
     fn map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         plane(py, self.size, self.map.clone())
+    }
+
+    /// squares() --
+    ///
+    /// Where it is wrong: (x, y, width, height, ratio) of squares of 64 pixels that overlap by half. The worst of all has
+    /// the ratio of the picture.
+    fn squares(&self) -> Vec<(usize, usize, usize, usize, f64)> {
+        let found = |(tile, ratio): &(Tile, f64)| (tile.x, tile.y, tile.width, tile.height, *ratio);
+        self.squares.iter().map(found).collect()
     }
 
     fn __repr__(&self) -> String {
@@ -217,12 +228,16 @@ fn compare(
             PairError::Size(error) => error.raise(),
             other => CriterionError::new_err(other.to_string()),
         })?;
-        return Ok(PyExcess { excess, size, map });
+        let worst = |tile: &Tile| tile.rows(size.0).flatten().map(|pixel| map[pixel]).fold(0.0, f32::max);
+        let squares = squares(size).into_iter().map(|tile| (tile, f64::from(worst(&tile)))).collect();
+        return Ok(PyExcess { excess, size, map, squares });
     };
     let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());
     let compared = pair.compare(params).map_err(Raise::raise)?;
     let halves = DenoisedHalves { size, noisy: [&pictures[0], &pictures[1]], denoised: [&da, &db] };
     let error = DenoisedError::new(&halves, compared.display()).map_err(|error| failed(&error))?;
-    let (excess, map) = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;
-    Ok(PyExcess { excess: Excess { pictures: pair.digest(), ..excess }, size, map })
+    let found = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;
+    let DenoisedExcess { worst, squares, map } = found;
+    let excess = Excess { pictures: pair.digest(), ..worst };
+    Ok(PyExcess { excess, size, map, squares })
 }

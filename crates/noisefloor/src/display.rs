@@ -6,10 +6,14 @@ use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+mod cube;
 pub(crate) mod exposure;
+mod lut;
 mod srgb;
 mod tone_curve;
 mod tone_table;
+pub use cube::{CubeError, parse_cube};
+pub use lut::{ColourLut, LutInput, LutInputError};
 pub use srgb::{srgb_decode, srgb_encode};
 pub use tone_curve::ToneCurve;
 pub use tone_table::{ToneTable, ToneTableError};

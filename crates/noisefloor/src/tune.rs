@@ -27,7 +27,7 @@ use crate::oracle::Oracle;
 use crate::params::Params;
 use crate::rgb::Rgb;
 use crate::stills::{SnapshotPair, Still, StillError};
-use crate::tile::{TileError, TileGrid};
+use crate::tile::{Tile, TileError, TileGrid};
 use thiserror::Error;
 
 /// What is aimed at, as a share of what may be seen: an estimate that is a tenth too high does not cost
@@ -174,6 +174,22 @@ impl Excess {
         let ratio = if ratio >= 0.0 { ratio } else { f64::INFINITY };
         Self { ratio, place: None, pictures: 0 }
     }
+}
+
+/// Edge of the squares that a picture is looked at in, in pixels: at a desk, 1.7°.
+const SQUARE: usize = 64;
+
+/// The squares of a picture of which the worst counts: of 64 pixels, overlapping by half, row by row; those of a
+/// picture that is smaller are cut.
+pub fn squares((width, height): (usize, usize)) -> Vec<Tile> {
+    let places = |side: usize| {
+        let last = side.saturating_sub(SQUARE);
+        (0..last).step_by(SQUARE / 2).chain([last])
+    };
+    let (across, down) = (SQUARE.min(width), SQUARE.min(height));
+    let square = |x, y| Tile { index: 0, x, y, width: across, height: down };
+    let rows = places(height).flat_map(|y| places(width).map(move |x| (x, y)));
+    rows.enumerate().map(|(index, (x, y))| Tile { index, ..square(x, y) }).collect()
 }
 
 /// Two pictures of one view, rendered with the same setting and different seeds, and their mean: what is
@@ -551,6 +567,27 @@ mod tests {
         assert!((strong / weak / 4.0).ln().abs() < 0.25, "{strong} {weak}");
         // What two halves of one film say is the same: a session stops where the mean of two passes
         assert!(strong > 1.0, "{strong}");
+    }
+
+    #[test]
+    fn squares_cover_a_picture_and_overlap_by_half() {
+        for size in [(192, 130), (64, 64), (65, 200), (40, 30)] {
+            let all = squares(size);
+            let mut covered = vec![0; size.0 * size.1];
+            for (place, square) in all.iter().enumerate() {
+                assert_eq!(
+                    (square.index, square.width, square.height),
+                    (place, size.0.min(64), size.1.min(64))
+                );
+                square.rows(size.0).flatten().for_each(|pixel| covered[pixel] += 1);
+            }
+            // Two rows of two, and more only where the last ones are moved inwards
+            assert!(covered.iter().all(|times| (1..=9).contains(times)), "{size:?}");
+        }
+        assert_eq!(
+            squares((192, 64)).iter().map(|square| square.x).collect::<Vec<_>>(),
+            [0, 32, 64, 96, 128]
+        );
     }
 
     #[test]

@@ -4,8 +4,9 @@ use crate::refuse;
 use crate::spell::{JobPath, as_typed};
 use anyhow::Context;
 use clap::Args;
+use noisefloor::display::LutInput;
 use noisefloor::{ToneMapping, display::DEFAULT_KEY};
-use noisefloor_image::{LutInput, read_cube};
+use noisefloor_image::read_cube;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

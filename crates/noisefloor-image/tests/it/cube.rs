@@ -1,5 +1,6 @@
+use noisefloor::display::{CubeError, LutInput, parse_cube};
 use noisefloor::{Params, ToneMapping, display::srgb_encode};
-use noisefloor_image::{CubeError, LutInput, parse_cube, read_cube};
+use noisefloor_image::read_cube;
 
 /// A cube whose entry at (r, g, b) is `value` of these, in [0, 1].
 fn cube(size: usize, head: &str, value: impl Fn([f32; 3]) -> [f32; 3]) -> String {

@@ -10,7 +10,7 @@ use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, TileGr
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::{FIRST_HITS_SPP, Opened, Resources, Source, SourceJob, SourceKind};
-use noisefloor_denoise::{DenoisedError, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
+use noisefloor_denoise::{DenoisedError, DenoisedExcess, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
 use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
 use std::fs::File;
 use std::time::Duration;
@@ -275,8 +275,8 @@ impl<'a> Judges<'a> {
                 let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;
                 let error =
                     DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
-                let (excess, map) = error.excess(*lost, &self.params.viewing)?;
-                let excess = Excess { pictures: halves.digest(), ..excess };
+                let DenoisedExcess { worst, map, .. } = error.excess(*lost, &self.params.viewing)?;
+                let excess = Excess { pictures: halves.digest(), ..worst };
                 let denoised = Some(denoiser.denoise(&guided(&mean, 0))?);
                 Ok(Judged { excess, size, mean, denoised, display, map, spp })
             }

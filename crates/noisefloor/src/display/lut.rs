@@ -1,9 +1,7 @@
 //! Colour look-up tables as tone mappings.
 
-use noisefloor::{
-    Rgb,
-    display::{ToneCurve, srgb_encode},
-};
+use crate::display::{ToneCurve, srgb_encode};
+use crate::rgb::Rgb;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
