@@ -16,6 +16,8 @@ mod traverse;
 mod tree;
 
 #[cfg(test)]
+mod speed;
+#[cfg(test)]
 mod tests;
 
 pub(crate) use bvh::{Bvh, HitShape};

@@ -2,7 +2,7 @@
 
 use super::bvh::{Bvh, HitShape, LocalHit};
 use super::leaf::Spot;
-use super::node::WideRay;
+use super::node::{Node, WideRay};
 use super::tree::{Tree, Waiting};
 use crate::geometry::NO;
 use crate::math::{Ray, Vec3};
@@ -196,7 +196,7 @@ impl Hierarchy {
         stack: &mut Stack,
         solid: impl Fn(u32, u32, Spot) -> bool,
     ) -> Hit {
-        self.tree.nearest(&WideRay::new(ray), best.t, &mut stack.instances, |index| {
+        self.tree.nearest(&WideRay::new(ray), best.t, &mut stack.instances, Node::meet, |index| {
             let instance = &self.instances[index as usize];
             let (local, longer) = instance.local_ray(ray);
             let object = &self.objects[instance.object()];
@@ -233,7 +233,7 @@ impl Hierarchy {
         stack: &mut Stack,
         solid: impl Fn(u32, u32, Spot) -> bool,
     ) -> bool {
-        self.tree.any(&WideRay::new(ray), t_max, &mut stack.instances, |index| {
+        self.tree.any(&WideRay::new(ray), t_max, &mut stack.instances, Node::meet, |index| {
             let instance = &self.instances[index as usize];
             let (local, longer) = instance.local_ray(ray);
             let object = &self.objects[instance.object()];

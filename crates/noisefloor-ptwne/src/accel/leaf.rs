@@ -94,12 +94,13 @@ impl Pack {
     }
 
     /// Distances, u, v, and a mask of the surfaces that the ray meets before `t_max`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn intersect(&self, ray: &WideRay, t_max: f32) -> (Vec4, Vec4, Vec4, u32) {
+        let (origin, dir) = (ray.origin.map(Vec4::splat), ray.dir.map(Vec4::splat));
         let dot = |a: &[Vec4; 3], b: &[Vec4; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let to: [Vec4; 3] = std::array::from_fn(|i| self.corner[i] - ray.origin[i]);
-        let t = dot(&self.normal, &to) / dot(&self.normal, &ray.dir);
-        let at: [Vec4; 3] = std::array::from_fn(|i| ray.dir[i] * t - to[i]);
+        let to: [Vec4; 3] = std::array::from_fn(|i| self.corner[i] - origin[i]);
+        let t = dot(&self.normal, &to) / dot(&self.normal, &dir);
+        let at: [Vec4; 3] = std::array::from_fn(|i| dir[i] * t - to[i]);
         let (u, v) = (dot(&self.dual_u, &at), dot(&self.dual_v, &at));
         let low = u.min(v);
         let inside = low.cmpge(Vec4::splat(-EDGE))

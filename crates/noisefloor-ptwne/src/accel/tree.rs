@@ -1,7 +1,7 @@
 //! A hierarchy of boxes: how it is built, and how a ray walks it. What its leaves hold is somebody else's.
 
 use super::median;
-use super::node::{LEAF, Node, WideRay};
+use super::node::{LEAF, Lanes, Node, WIDTH, WideRay};
 use crate::math::Vec3;
 use crate::rng;
 use obvhs::aabb::Aabb;
@@ -39,22 +39,22 @@ impl Tree {
     /// Builds the hierarchy over `boxes`. `leaf` is told which of them a leaf has, at most `most`, and numbers
     /// it.
     pub(super) fn new(boxes: &[Aabb], most: usize, mut leaf: impl FnMut(&[u32]) -> u32) -> Self {
-        let mut tree = Self { nodes: vec![Node::EMPTY], waiting: 4 };
+        let mut tree = Self { nodes: vec![Node::EMPTY], waiting: WIDTH };
         if !boxes.is_empty() {
-            tree.waiting = 3 * tree.collapse(&binary(boxes), most, &mut leaf) + 4;
+            tree.waiting = (WIDTH - 1) * tree.collapse(&binary(boxes), most, &mut leaf) + WIDTH;
             tree.nodes.shrink_to_fit();
         }
         tree
     }
 
-    /// Collapses the binary tree: each wide node opens the largest of its inner children until it has four.
+    /// Collapses the binary tree: each wide node opens the largest of its inner children until it has eight.
     /// Subtrees of at most `most` boxes become leaves. Returns the depth.
     fn collapse(&mut self, tree: &Bvh2, most: usize, leaf: &mut impl FnMut(&[u32]) -> u32) -> usize {
         let mut depth = 1;
         let mut todo = vec![(0usize, vec![0usize], 1usize)];
         while let Some((at, mut children, level)) = todo.pop() {
             depth = level.max(depth);
-            while children.len() < 4 {
+            while children.len() < WIDTH {
                 let large = |i: &usize| at_most(most, tree, children[*i]).is_none();
                 let area = |i: &usize| tree.nodes[children[*i]].aabb().half_area();
                 let Some(open) = (0..children.len()).filter(large).max_by(|a, b| area(a).total_cmp(&area(b)))
@@ -67,8 +67,8 @@ impl Tree {
             for (lane, &child) in children.iter().enumerate() {
                 let node = &tree.nodes[child];
                 for axis in 0..3 {
-                    self.nodes[at].bounds[axis][0][lane] = node.aabb().min[axis];
-                    self.nodes[at].bounds[axis][1][lane] = node.aabb().max[axis];
+                    self.nodes[at].bounds[axis][0].set(lane, node.aabb().min[axis]);
+                    self.nodes[at].bounds[axis][1].set(lane, node.aabb().max[axis]);
                 }
                 self.nodes[at].child[lane] = if let Some(prims) = at_most(most, tree, child) {
                     LEAF | leaf(prims.as_slice())
@@ -85,35 +85,44 @@ impl Tree {
     }
 
     /// Visits the leaves that begin before `t_max`, nearest first as far as boxes tell. `visit` is given the
-    /// number of a leaf, and says before which distance leaves count from now on.
+    /// number of a leaf, and says before which distance leaves count from now on; `meet` is [`Node::meet`].
     #[inline(always)]
     pub(super) fn nearest(
         &self,
         ray: &WideRay,
         mut t_max: f32,
         waiting: &mut Waiting,
+        meet: impl Fn(&Node, &WideRay, f32) -> (Lanes, u32),
         mut visit: impl FnMut(u32) -> f32,
     ) {
+        let waiting = waiting.0.as_mut_slice();
         let mut top = 0;
         let mut node = 0u32;
         loop {
             if node & LEAF == 0 {
                 let n = &self.nodes[node as usize];
-                let (enter, mut mask) = n.intersect(ray, t_max);
+                let (enter, mut mask) = meet(n, ray, t_max);
                 if mask != 0 {
-                    // Descend into the nearest child, leave the others behind
-                    let mut near = mask.trailing_zeros() as usize & 3;
+                    // Descend into the nearest child, leave the others behind in order
+                    let mut near = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
                     if mask != 0 {
                         let enter = enter.to_array();
+                        let first = top;
                         while mask != 0 {
-                            let mut other = mask.trailing_zeros() as usize & 3;
+                            let mut other = mask.trailing_zeros() as usize & 7;
                             mask &= mask - 1;
                             if enter[other] < enter[near] {
                                 std::mem::swap(&mut near, &mut other);
                             }
-                            waiting.0[top] = (n.child[other], enter[other]);
+                            let entry = (n.child[other], enter[other]);
+                            let mut at = top;
                             top += 1;
+                            while at > first && waiting[at - 1].1 < entry.1 {
+                                waiting[at] = waiting[at - 1];
+                                at -= 1;
+                            }
+                            waiting[at] = entry;
                         }
                     }
                     node = n.child[near];
@@ -128,7 +137,7 @@ impl Tree {
                     return;
                 }
                 top -= 1;
-                let (next, t) = waiting.0[top];
+                let (next, t) = waiting[top];
                 if t < t_max {
                     node = next;
                     break;
@@ -144,21 +153,23 @@ impl Tree {
         ray: &WideRay,
         t_max: f32,
         waiting: &mut Waiting,
+        meet: impl Fn(&Node, &WideRay, f32) -> (Lanes, u32),
         mut visit: impl FnMut(u32) -> bool,
     ) -> bool {
+        let waiting = waiting.0.as_mut_slice();
         let mut top = 0;
         let mut node = 0u32;
         loop {
             if node & LEAF == 0 {
                 let n = &self.nodes[node as usize];
-                let (_, mut mask) = n.intersect(ray, t_max);
+                let (_, mut mask) = meet(n, ray, t_max);
                 if mask != 0 {
                     // Descend into one child, leave the others behind
-                    let child = |mask: u32| n.child[mask.trailing_zeros() as usize & 3];
+                    let child = |mask: u32| n.child[mask.trailing_zeros() as usize & 7];
                     node = child(mask);
                     mask &= mask - 1;
                     while mask != 0 {
-                        waiting.0[top].0 = child(mask);
+                        waiting[top].0 = child(mask);
                         top += 1;
                         mask &= mask - 1;
                     }
@@ -171,7 +182,7 @@ impl Tree {
                 return false;
             }
             top -= 1;
-            node = waiting.0[top].0;
+            node = waiting[top].0;
         }
     }
 
@@ -181,9 +192,9 @@ impl Tree {
         let mut todo = vec![0u32];
         while let Some(index) = todo.pop() {
             let node = &self.nodes[index as usize];
-            for lane in 0..4 {
+            for lane in 0..WIDTH {
                 let bound =
-                    |end: usize| Vec3::from_array(std::array::from_fn(|axis| node.bounds[axis][end][lane]));
+                    |end: usize| Vec3::from_array(std::array::from_fn(|axis| node.bounds[axis][end].at(lane)));
                 let (low, high) = (bound(0) - apex, bound(1) - apex);
                 // Empty lanes have low > high. A thousandth of size and distance covers rounding
                 let slack = 1e-3 * high.abs().max(low.abs()).max_element();
