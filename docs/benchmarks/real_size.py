@@ -130,7 +130,7 @@ def package(args):
 def as_good(uniform, lost):
     """Samples at which uniform sampling has lost as much: straight between two counts in logarithms. None outside."""
     for (low, before), (high, after) in zip(uniform, uniform[1:]):
-        if before >= lost > after:
+        if before >= lost >= after:
             share = math.log(before / lost) / math.log(before / after)
             return low * (high / low) ** share
     return None

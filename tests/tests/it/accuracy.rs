@@ -79,11 +79,17 @@ fn p_is_the_share_of_simulated_people() {
     assert!(levels > 1000 && error < 0.03, "{levels} {error} {bins:?}");
 }
 
-/// The paper's machine on the same numbers, with one C and γ: the search takes minutes.
+/// The paper's machine on every third of the same levels, with one C and γ: with all of them it takes minutes, and the
+/// search hours.
 #[test]
 fn a_support_vector_machine_predicts_left_out_scenes_too() {
     let params = TrainParams { candidates: vec![SvmParams { c: 0.3, gamma: 0.01 }], ..TrainParams::svm() };
-    let predictions = leave_one_scene_out(&table(), &params, People::DEFAULT, |_| ()).unwrap();
+    let mut table = table();
+    for zone in &mut table.zones {
+        let mut number = 0..;
+        zone.levels.retain(|_| number.next().is_some_and(|n| n % 3 == 0));
+    }
+    let predictions = leave_one_scene_out(&table, &params, People::DEFAULT, |_| ()).unwrap();
     let scores = score(predictions.iter());
     assert!(scores.error_factor < 1.5 && scores.early_share <= 0.05, "{scores:?}");
 }

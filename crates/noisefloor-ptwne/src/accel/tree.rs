@@ -193,8 +193,9 @@ impl Tree {
         while let Some(index) = todo.pop() {
             let node = &self.nodes[index as usize];
             for lane in 0..WIDTH {
-                let bound =
-                    |end: usize| Vec3::from_array(std::array::from_fn(|axis| node.bounds[axis][end].at(lane)));
+                let bound = |end: usize| {
+                    Vec3::from_array(std::array::from_fn(|axis| node.bounds[axis][end].at(lane)))
+                };
                 let (low, high) = (bound(0) - apex, bound(1) - apex);
                 // Empty lanes have low > high. A thousandth of size and distance covers rounding
                 let slack = 1e-3 * high.abs().max(low.abs()).max_element();
