@@ -523,7 +523,7 @@ class Addon(unittest.TestCase):
         for frame_number, energy in [(5, 20), (10, 1000), (15, 50)]:
             lamp.energy = energy
             lamp.keyframe_insert("energy", frame=frame_number)
-        scene.noisefloor.frames, scene.noisefloor.people = "markers", 0.5
+        scene.noisefloor.frames, scene.noisefloor.people = "markers", 0.8
         scene.frame_set(7)
         with self.assertRaisesRegex(RuntimeError, "no frame between"):
             bpy.ops.render.noisefloor_threshold()
