@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Cycles' noise threshold: defaults, guesses, fixed samples, and what Find Noise Threshold finds, for blender.md.
+"""Cycles' noise threshold: defaults, guesses, fixed samples, what Find Noise Threshold finds, and the add-on's own loop,
+for blender.md.
 
-    tune.py render ADDON.zip SCENE(.py|.blend) WIDTHxHEIGHT FOLDER [REFERENCE_SPP]   in an environment that has bpy
+    tune.py render ADDON.zip SCENE(.py|.blend) WIDTHxHEIGHT FOLDER [REFERENCE_SPP [SEEDS]]   in an environment that has bpy
     tune.py measure FOLDER...                                                       pip install cvvdp pillow
 
 `render` writes what Blender shows (view transform included) as PNGs of 16 bits, denoised by Cycles' own Open Image
-Denoise, two seeds a setting, beside times.json with the processor seconds of each render and of the search; it goes on
+Denoise, two seeds a setting unless said otherwise, beside times.json with the processor seconds of each render and of the search; it goes on
 where it was interrupted. `measure` says what the worst square of 64 pixels, side by side, has lost against the reference, by the package
 `cvvdp`, no code of this project: on average over two seeds, and of the worse one."""
 import json
@@ -17,10 +18,11 @@ import tempfile
 import time
 import zipfile
 
-SETTINGS = [("threshold", t) for t in (0.2, 0.1, 0.05, 0.03, 0.01)] + [("samples", n) for n in (64, 128, 256, 512, 1024)]
+THRESHOLDS = [("threshold", t) for t in (0.2, 0.1, 0.05, 0.03, 0.01)]
+SAMPLES = [("samples", n) for n in (64, 128, 256, 512, 1024)]
 
 
-def render(addon, path, size, folder, reference=4096):
+def render(addon, path, size, folder, reference=4096, seeds=2):
     import bpy
 
     folder = pathlib.Path(folder)
@@ -54,10 +56,13 @@ def render(addon, path, size, folder, reference=4096):
         if name in done:
             return
         cycles.use_adaptive_sampling, cycles.seed = kind != "samples", seed
+        scene.noisefloor.use, scene.noisefloor.write_maps = kind == "loop", False
         cycles.adaptive_threshold, cycles.samples = (value, 4096) if kind != "samples" else (0.01, int(value))
         before, begun = used(), time.time()
         bpy.ops.render.render()
         done[name] = {"user": used() - before, "wall": time.time() - begun}
+        if kind == "loop":
+            done[name]["said"] = noisefloor_addon.hooks.state.summary
         bpy.data.images["Render Result"].save_render(str(folder / f"{name}.png"), scene=scene)
         times.write_text(json.dumps(done, indent=1))
         print(name, done[name], flush=True)
@@ -74,12 +79,16 @@ def render(addon, path, size, folder, reference=4096):
         done["search"] = {"user": used() - before, "found": found, "said": noisefloor_addon.hooks.state.summary}
         times.write_text(json.dumps(done, indent=1))
         print("search", done["search"], flush=True)
-    for seed in (1, 2):
+    for seed in range(1, seeds + 1):
+        one("loop", 0, seed)
         if done["search"]["found"]:
             one("tuned", done["search"]["found"], seed)
-        for kind, value in SETTINGS:
+        for kind, value in THRESHOLDS:
             one(kind, value, seed)
     one("samples", reference, 77)
+    for seed in range(1, seeds + 1):
+        for kind, value in SAMPLES:
+            one(kind, value, seed)
 
 
 def measure(folders):

@@ -8,8 +8,6 @@ Run it by a Python that has bpy (4.2 or later) and the wheel of noisefloor: the 
 
 import os
 import pathlib
-import runpy
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -18,23 +16,9 @@ import zipfile
 import bpy
 import numpy
 
-ADDON = pathlib.Path(__file__).resolve().parent
 WORK = tempfile.TemporaryDirectory(prefix="noisefloor-addon-")
 FOLDER = pathlib.Path(WORK.name)
 SIZE = (128, 96)
-
-# What the host of the command renders: the first six batches of the frame, and the fourth of a part of it
-HOST = """
-import runpy, sys
-import numpy
-script, scene, out = sys.argv[1:]
-host = runpy.run_path(script, run_name="tested")["Cycles"]({"scene": scene, "seed": 5})
-frame = {"index": 0, "x": 0, "y": 0, "width": 128, "height": 96, "samples": 16}
-part = {"index": 1, "x": 64, "y": 32, "width": 40, "height": 64, "sequence": 1, "point": 16, "samples": 16}
-batches = [host.sample([{**frame, "sequence": k % 2, "point": k // 2 * 16}])[0][1] for k in range(6)]
-numpy.savez(out, part=host.sample([part])[0][1], batches=numpy.array(batches))
-"""
-
 
 def room(closed=False):
     """A cube on a plane, which costs little; closed, in a box, in which tiles with its shadow have more
@@ -60,8 +44,7 @@ def room(closed=False):
         "32",
         "NONE",
     )
-    scene.noisefloor.use, scene.noisefloor.tile = True, 64
-    scene.noisefloor.min_samples, scene.noisefloor.max_samples = 96, 160
+    scene.noisefloor.use, scene.noisefloor.max_samples = True, 160
     return scene
 
 
@@ -75,26 +58,31 @@ def pixels(path):
     return flat.reshape(height, width, -1)[::-1]
 
 
-# Sequence and first point of a frame's batches, in order
-POINTS = [(k % 2, k // 2 * 16) for k in range(6)]
-
-
 def rendered(scene):
-    """The picture, and the pictures of all batches with their regions and points, in the order in which Cycles
-    rendered them."""
-    batches, sample = [], frame.Frame._sample
+    """The picture, and all pictures that Cycles rendered for it, in order, with their regions, halves, thresholds and
+    the samples of their pixels."""
+    parts, sample = [], frame.Frame._sample
 
-    def record(self, region, points):
-        pictures = sample(self, region, points)
-        batches.append((region, points, pictures["Combined"].copy()))
-        return pictures
+    def record(self, region, half, threshold, samples, seconds):
+        pictures, counts = sample(self, region, half, threshold, samples, seconds)
+        parts.append((region, half, threshold, pictures["Combined"].copy(), counts))
+        return pictures, counts
 
     frame.Frame._sample = record
     try:
         bpy.ops.render.render(write_still=True)
     finally:
         frame.Frame._sample = sample
-    return pixels(scene.render.filepath + ".exr"), batches
+    return pixels(scene.render.filepath + ".exr"), parts
+
+
+def mean(parts):
+    """The mean of all samples, and how many there are."""
+    total, count = numpy.zeros((*SIZE[::-1], 4)), numpy.zeros((*SIZE[::-1], 1))
+    for (x, y, width, height), _, _, picture, counts in parts:
+        total[y : y + height, x : x + width] += picture * counts
+        count[y : y + height, x : x + width] += counts
+    return total / numpy.maximum(count, 1), count
 
 
 def facts(scene):
@@ -136,23 +124,23 @@ class Addon(unittest.TestCase):
     def test_off_it_changes_nothing(self):
         scene = room()
         scene.noisefloor.use = False
-        with_it, batches = rendered(scene)
+        with_it, parts = rendered(scene)
         noisefloor_addon.unregister()
         try:
             without = rendered(scene)[0]
         finally:
             noisefloor_addon.register()
-        self.assertEqual(batches, [])
+        self.assertEqual(parts, [])
         assert_same(with_it, without, scene.cycles.samples)
 
     def test_no_setting_changes_nor_is_saved_while_it_renders(self):
         scene, seen = room(), []
         before, saved, sample = facts(scene), FOLDER / "saved.blend", frame.Frame._sample
 
-        def look(self, region, points):
-            pictures = sample(self, region, points)
+        def look(self, *arguments):
+            pictures = sample(self, *arguments)
             seen.append(facts(scene))
-            if points == POINTS[2]:
+            if len(seen) == 2:
                 bpy.data.libraries.write(str(saved), {scene})
             return pictures
 
@@ -161,7 +149,7 @@ class Addon(unittest.TestCase):
             bpy.ops.render.render()
         finally:
             frame.Frame._sample = sample
-        self.assertGreater(len(seen), 5)
+        self.assertGreater(len(seen), 1)
         for facts_then in [*seen, facts(scene)]:
             self.assertEqual(facts_then, before)
         with bpy.data.libraries.load(str(saved)) as (there, here):
@@ -172,10 +160,10 @@ class Addon(unittest.TestCase):
         scene, sample = room(), frame.Frame._sample
         before = facts(scene)
 
-        def fail(self, region, points):
-            if points == POINTS[2]:
+        def fail(self, region, half, *more):
+            if half == 1:
                 raise ValueError("on purpose")
-            return sample(self, region, points)
+            return sample(self, region, half, *more)
 
         frame.Frame._sample = fail
         try:
@@ -184,51 +172,93 @@ class Addon(unittest.TestCase):
         finally:
             frame.Frame._sample = sample
         self.assertEqual(facts(scene), before)
-        self.assertGreater(len(rendered(scene)[1]), 5)
+        self.assertGreater(len(rendered(scene)[1]), 1)
 
-    @unittest.skipIf(bpy.app.binary_path, "the host of the command needs Blender as a module")
-    def test_samples_are_those_of_the_command(self):
-        scene = room()
-        blend = FOLDER / "room.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
-        batches = rendered(scene)[1]
-        script, out = FOLDER / "host" / "cycles_host.py", FOLDER / "host.npz"
-        script.parent.mkdir(exist_ok=True)
-        host = (ADDON.parent / "host" / "cycles_host.py").read_text()
-        script.write_text((FOLDER / "noisefloor_addon" / "sampling.py").read_text() + "\n\n" + host)
-        (script.parent / "host.py").write_text((FOLDER / "noisefloor_addon" / "host.py").read_text())
-        (FOLDER / "run.py").write_text(HOST)
-        subprocess.run([sys.executable, FOLDER / "run.py", script, blend, out], check=True)
-        with numpy.load(out) as theirs:
-            for k, (region, points, picture) in enumerate(batches[:6]):
-                self.assertEqual((region, points), ((0, 0, *SIZE), POINTS[k]))
-                assert_same(picture[..., :3], theirs["batches"][k], 16, f"batch {k}")
-            assert_same(batches[3][2][32:96, 64:104, :3], theirs["part"], 16)
-        self.assertGreater(numpy.abs(batches[0][2] - batches[1][2]).max(), 0.01)
-
-    def test_the_picture_is_the_mean_of_its_batches(self):
+    def test_its_pictures_are_those_of_cycles(self):
         scene = room(closed=True)
-        # More people see where there is more noise
-        scene.noisefloor.max_samples, scene.noisefloor.people = 2048, 0.99
-        picture, batches = rendered(scene)
-        total, count = numpy.zeros((*SIZE[::-1], 4)), numpy.zeros((*SIZE[::-1], 1))
-        for (x, y, width, height), _, batch in batches:
-            total[y : y + height, x : x + width] += batch
-            count[y : y + height, x : x + width] += 1
-        # A film in float32 rounds each of at most 128 batches
-        numpy.testing.assert_allclose(picture, total / count, rtol=128 * 2**-24, atol=1e-6)
-        self.assertGreater(count.max(), count.min(), "all tiles stopped alike: a scene that tests nothing")
+        cycles, seeds, adapt = scene.cycles, [], sampling.adapt
+        cycles.adaptive_min_samples = 40
+
+        def record(cycles, seed, threshold, samples):
+            seeds.append((seed, threshold, samples))
+            adapt(cycles, seed, threshold, samples)
+
+        sampling.adapt = record
+        try:
+            parts = rendered(scene)[1]
+        finally:
+            sampling.adapt = adapt
+        self.assertNotEqual(seeds[0][0], seeds[1][0])
+        scene.noisefloor.use, cycles.use_adaptive_sampling = False, True
+        for (seed, threshold, samples), (region, half, _, picture, counts) in zip(seeds, parts):
+            cycles.seed, cycles.adaptive_threshold, cycles.samples = seed, threshold, samples
+            if region == (0, 0, *SIZE):
+                assert_same(picture[..., :3], rendered(scene)[0][..., :3], samples, f"half {half}")
+            # Cycles looks at its threshold after whole steps of 16 samples
+            self.assertTrue((((counts % 16 == 0) & (counts >= 48)) | (counts == samples)).all(), numpy.unique(counts))
+        self.assertGreater(numpy.abs(parts[0][3] - parts[1][3]).max(), 0.01)
+
+    def test_the_picture_is_the_mean_of_all_samples(self):
+        scene = room(closed=True)
+        scene.noisefloor.max_samples, scene.noisefloor.people = 4096, 0.9
+        picture, parts = rendered(scene)
+        wanted, count = mean(parts)
+        # Sums of at most 4096 samples in some pictures, in float32
+        numpy.testing.assert_allclose(picture, wanted, rtol=2e-6 * len(parts), atol=1e-6)
+        self.assertGreater(count.max(), count.min(), "all pixels have as many samples: a scene that tests nothing")
         summary = hooks.state.summary
-        self.assertIn("4 of 4 tiles without visible noise", summary)
-        self.assertIn(f"{16 * int(count.min())} to {16 * int(count.max())} samples", summary)
+        self.assertRegex(summary, r"^(\d+) of \1 squares without visible noise \(90% of people, desk, ")
+        self.assertIn(f"{count.min():.0f} to {count.max():.0f} samples per pixel", summary)
+        self.assertNotIn("ended", summary)
+
+    def test_only_places_that_fail_get_more_samples_and_each_as_many_as_it_needs(self):
+        scene = room(closed=True)
+        scene.noisefloor.max_samples, efforts = 1 << 20, []
+
+        class Excess:
+            """Two squares of a row, one four times as far from passing as the other, and one below that passes."""
+
+            def __init__(self, effort):
+                self.found = [(0, 32, 64, 64, 0.5)]
+                for x, threshold in [(0, 0.06), (96, 0.12)]:
+                    self.found.append((x, 0, 32, 32, (threshold**-2 / effort[0, x // 32]) ** 0.5))
+                self.ratio = max(ratio for *_, ratio in self.found)
+
+            def squares(self):
+                return self.found
+
+            def map(self):
+                return numpy.zeros(SIZE[::-1], numpy.float32)
+
+        def excess(self, pair):
+            efforts.append(hooks.state.frame.effort.copy())
+            return Excess(efforts[-1])
+
+        known, judging.Judge.excess = judging.Judge.excess, excess
+        try:
+            _, parts = rendered(scene)
+        finally:
+            judging.Judge.excess = known
+        self.assertGreater(len(efforts), 1)
+        # Everything once, and then only what failed
+        first, last = efforts[0][0, 0], efforts[-1]
+        self.assertTrue((efforts[0] == first).all())
+        self.assertTrue((last[1:] == first).all() and (last[0, 1:3] == first).all(), last)
+        for region, *_ in parts[2:]:
+            self.assertEqual((region[1], region[3]), (0, 32))
+        # Both pass, and the better one with not much more than it needs
+        self.assertGreaterEqual(last[0, 0] * 0.06**2, 1)
+        self.assertTrue(1 <= last[0, 3] * 0.12**2 < 2.5, last)
 
     def test_passes_maps_summary_and_metadata_are_left(self):
         scene = room()
         layer, settings = scene.view_layers[0], scene.render.image_settings
         layer.use_pass_z = layer.use_pass_normal = layer.use_pass_cryptomatte_object = True
-        picture, _ = rendered(scene)
+        picture, parts = rendered(scene)
         exr = pathlib.Path(scene.render.filepath + ".exr").read_bytes()
-        self.assertIn(b"tiles without visible noise", exr)
+        # Who looks, how it is shown, and the thresholds
+        for words in (b"squares without visible noise", b"95% of people, desk, ", b"thresholds 0.283"):
+            self.assertIn(words, exr)
         if hasattr(settings, "media_type"):
             settings.media_type = "MULTI_LAYER_IMAGE"
         settings.file_format = "OPEN_EXR_MULTILAYER"
@@ -253,28 +283,37 @@ class Addon(unittest.TestCase):
         self.assertGreater(picture[..., :3].std(), 0.01)
 
     def test_limits_and_esc_keep_what_there_is(self):
-        scene = room()
-        scene.noisefloor.max_samples, scene.noisefloor.people = 64, 0.99
-        _, batches = rendered(scene)
-        self.assertEqual([points for _, points, _ in batches], POINTS[:4])
-        scene.noisefloor.time_limit = 1e-3
-        picture, batches = rendered(scene)
-        numpy.testing.assert_allclose(picture, batches[0][2], rtol=1e-6)
-        self.assertIn("4 ended: time-limit", hooks.state.summary)
+        scene = room(closed=True)
+        scene.noisefloor.max_samples, scene.noisefloor.people = 96, 0.99
+        picture, parts = rendered(scene)
+        self.assertEqual(mean(parts)[1].max(), 96)
+        self.assertIn("ended: max-spp", hooks.state.summary)
+        scene.noisefloor.max_samples, scene.noisefloor.time_limit = 1 << 15, 4
+        scene.cycles.adaptive_min_samples = 1 << 14
+        picture, parts = rendered(scene)
+        numpy.testing.assert_allclose(picture, mean(parts)[0], rtol=1e-5, atol=1e-6)
+        # Both halves had their share of the time, and no more
+        self.assertEqual([half for _, half, *_ in parts], [0, 1])
+        self.assertIn("ended: time-limit", hooks.state.summary)
         scene.noisefloor.time_limit, calls = 0, []
+        scene.cycles.adaptive_min_samples = 0
 
-        def esc(self):
-            calls.append(None)
-            return len(calls) > 2
+        for pictures in (1, 2):
 
-        cancelled, frame.Frame._cancelled = frame.Frame._cancelled, esc
-        try:
-            picture, batches = rendered(scene)
-        finally:
-            frame.Frame._cancelled = cancelled
-        self.assertEqual(len(batches), 3)
-        numpy.testing.assert_allclose(picture, (batches[0][2] + batches[1][2]) / 2, rtol=1e-6)
-        self.assertIn("4 ended: cancelled", hooks.state.summary)
+            def esc(self):
+                calls.append(None)
+                return len(calls) >= pictures
+
+            cancelled, frame.Frame._cancelled = frame.Frame._cancelled, esc
+            try:
+                calls.clear()
+                picture, parts = rendered(scene)
+            finally:
+                frame.Frame._cancelled = cancelled
+            # One that was stopped counts only where there is nothing better
+            self.assertEqual(len(parts), pictures)
+            numpy.testing.assert_allclose(picture, mean(parts)[0], rtol=1e-5, atol=1e-6)
+            self.assertIn("ended: cancelled", hooks.state.summary)
 
     def test_animations_resume_frame_by_frame(self):
         scene = room()
@@ -313,7 +352,7 @@ class Addon(unittest.TestCase):
         finally:
             settings.params = made
         # Each frame has a seed of its own, whatever was rendered before it
-        assert_same(both[1], alone, 96)
+        assert_same(both[1], alone, 192)
         self.assertGreater(numpy.abs(both[0] - both[1]).max(), 0.01)
         self.assertEqual(judged, [23.976, 23.976, None, None, 23.976, 23.976, None])
 
@@ -329,10 +368,14 @@ class Addon(unittest.TestCase):
             0.2,
             0.7,
         )
-        part = rendered(scene)[0]
+        part, parts = rendered(scene)
         left, bottom = int(0.3 * SIZE[0]), int(0.2 * SIZE[1])
         top = SIZE[1] - bottom - part.shape[0]
-        assert_same(part, whole[top : top + part.shape[0], left : left + part.shape[1]], 96)
+        whole = whole[top : top + part.shape[0], left : left + part.shape[1]]
+        # At its edges, Cycles' adaptive sampling does not see the noise of neighbours outside: some samples fewer
+        same = numpy.isclose(part, whole, rtol=2e-5).all(axis=-1)
+        self.assertGreater(same.mean(), 0.9)
+        self.assertLess(numpy.abs(part - whole).mean(), 0.02 * whole.mean())
 
     def test_what_moves_is_blurred_as_by_cycles(self):
         scene = room()
@@ -343,39 +386,53 @@ class Addon(unittest.TestCase):
             scene.cycles.samples = frame_number
             scene.cycles.keyframe_insert("samples", frame=frame_number)
         scene.frame_set(2)
-        picture, batches = rendered(scene)
-        self.assertGreater(numpy.abs(batches[0][2] - batches[1][2]).mean(), 0)
+        picture, parts = rendered(scene)
+        # The keys of the file say 2 samples, and hold again whenever Cycles moves the scene
+        self.assertGreater(mean(parts)[1].min(), 60)
+        self.assertGreater(numpy.abs(parts[0][3] - parts[1][3]).mean(), 0)
         scene.animation_data_clear()
         scene.noisefloor.use, scene.cycles.samples, scene.cycles.use_adaptive_sampling = False, 96, False
-        plain, still = rendered(scene)[0], numpy.abs(batches[0][2] - picture).mean()
-        # Both have at most a sixth of the variance of a batch: they differ by √(2/6) of what a batch does, or less
-        self.assertLess(numpy.abs(picture - plain).mean(), still)
+        plain, still = rendered(scene)[0], numpy.abs(parts[0][3] - picture).mean()
+        # A half has twice the variance of both: it differs from them by 1/√2 of its noise, and two pictures that are
+        # alike by √2 of theirs, which is 1/√2 of its noise
+        self.assertLess(numpy.abs(picture - plain).mean(), 2 * still)
 
     def test_every_layer_has_its_own_stops(self):
         scene = room()
         scene.noisefloor.max_samples = 96
         scene.view_layers.new("second").use_sky = False
-        _, batches = rendered(scene)
-        self.assertEqual([points for _, points, _ in batches], POINTS * 2)
+        _, parts = rendered(scene)
+        self.assertEqual([half for _, half, *_ in parts][:2], [0, 1])
+        self.assertGreater(len(parts), 3)
         self.assertIn("noisefloor samples, second", bpy.data.images)
 
-    def test_denoised_pictures_have_less_noise(self):
-        scene = room()
-        scene.noisefloor.max_samples = 96
-        noisy, _ = rendered(scene)
-        scene.cycles.use_denoising = True
+    def test_denoised_pictures_are_judged_as_such_and_the_noisy_one_is_kept(self):
+        scene = room(closed=True)
+        scene.noisefloor.max_samples, scene.cycles.use_denoising = 8192, True
         if denoise.library() is None:
             self.skipTest("this Blender has no Open Image Denoise")
-        picture, batches = rendered(scene)
-        mean = sum(batch for _, _, batch in batches) / len(batches)
-        numpy.testing.assert_allclose(mean, noisy, rtol=1e-5, atol=1e-6)
+        picture, parts = rendered(scene)
+        self.assertIn("denoised by Open Image Denoise, at most 0.3 JOD lost", hooks.state.summary)
+        denoised, noisy = mean(parts)[1].mean(), mean(parts)[0]
+        self.assertIn("noisefloor jod lost", bpy.data.images)
+        settings = scene.render.image_settings
+        if hasattr(settings, "media_type"):
+            settings.media_type = "MULTI_LAYER_IMAGE"
+        settings.file_format = "OPEN_EXR_MULTILAYER"
+        bpy.data.images["Render Result"].save_render(str(FOLDER / "denoised.exr"))
+        layers = (FOLDER / "denoised.exr").read_bytes()
+        for name in ["Combined", "Noisy Image", "Denoising Albedo", "noisefloor JOD Lost", "noisefloor Samples"]:
+            self.assertIn(f".{name}.".encode(), layers)
 
         def roughness(image):
             return numpy.abs(numpy.diff(image[..., 1], axis=1)).mean()
 
         self.assertLess(roughness(picture), 0.8 * roughness(noisy))
         self.assertLess(abs(picture[..., :3].mean() / noisy[..., :3].mean() - 1), 0.02)
-
+        # What the denoiser removes needs no samples
+        scene = room(closed=True)
+        scene.noisefloor.max_samples = 8192
+        self.assertLess(denoised, 0.7 * mean(rendered(scene)[1])[1].mean())
 
     def test_the_table_shows_what_blender_shows(self):
         scene, random = room(), numpy.random.default_rng(3)
@@ -418,8 +475,7 @@ class Addon(unittest.TestCase):
 
     def test_the_picture_is_judged_as_it_is_shown(self):
         scene, samples = room(closed=True), []
-        scene.noisefloor.max_samples, scene.noisefloor.people = 4096, 0.99
-        scene.noisefloor.min_samples = 32
+        scene.noisefloor.max_samples = 4096
         for exposure in (-6, 0):
             scene.view_settings.exposure = exposure
             rendered(scene)
@@ -454,10 +510,47 @@ class Addon(unittest.TestCase):
                         cycles.adaptive_threshold, cycles.seed = threshold * 2**0.5, seed
                         scene.noisefloor.use = False
                         pair.append(rendered(scene)[0][..., :3])
-                    params = settings.still_params(scene, display.table(scene))
+                    params = settings.params(scene, display.table(scene))
                     ratios.append(noisefloor.excess(*pair, params=params).ratio)
                 self.assertLess(ratios[0], 1.2)
                 self.assertGreater(ratios[1], 1.2)
+
+    def test_a_threshold_for_marked_frames_is_that_of_the_hardest(self):
+        scene = room(closed=True)
+        scene.cycles.samples, scene.frame_start, scene.frame_end = 4096, 1, 20
+        # The others are so dark that little is seen in them
+        lamp, seen = bpy.data.lights["Light"], []
+        for frame_number, energy in [(5, 20), (10, 1000), (15, 50)]:
+            lamp.energy = energy
+            lamp.keyframe_insert("energy", frame=frame_number)
+        scene.noisefloor.frames, scene.noisefloor.people = "markers", 0.8
+        scene.frame_set(7)
+        with self.assertRaisesRegex(RuntimeError, "no frame between"):
+            bpy.ops.render.noisefloor_threshold()
+        for frame_number in (5, 10, 15, 99):
+            scene.timeline_markers.new(f"mark {frame_number}", frame=frame_number)
+        before = facts(scene)
+
+        def record(scene, *_):
+            seen.append(scene.frame_current)
+
+        bpy.app.handlers.render_pre.append(record)
+        try:
+            self.assertEqual(bpy.ops.render.noisefloor_threshold(), {"FINISHED"})
+        finally:
+            bpy.app.handlers.render_pre.remove(record)
+        # Two pictures of each with the first setting, and then the hardest first
+        self.assertEqual(seen[:6], [5, 5, 10, 10, 15, 15])
+        self.assertEqual(seen[6:8], [10, 10])
+        self.assertIn("frame 10 is the hardest of 3", hooks.state.summary)
+        found, after = scene.cycles.adaptive_threshold, facts(scene)
+        changed = {key for key in before if before[key] != after[key]}
+        self.assertLessEqual(changed, {("cycles", "adaptive_threshold"), ("cycles", "use_adaptive_sampling")})
+        # In one film, noise that is new in every frame may be stronger
+        scene.cycles.use_animated_seed = True
+        bpy.ops.render.noisefloor_threshold()
+        self.assertIn("at 24 frames a second", hooks.state.summary)
+        self.assertGreater(scene.cycles.adaptive_threshold, found)
 
     def test_a_search_that_finds_nothing_says_why(self):
         scene = room(closed=True)
@@ -474,7 +567,7 @@ zipfile.ZipFile(arguments[0]).extractall(FOLDER)
 sys.path.insert(0, str(FOLDER))
 import noisefloor_addon
 import noisefloor
-from noisefloor_addon import denoise, display, frame, hooks, settings
+from noisefloor_addon import denoise, display, frame, hooks, judging, sampling, settings
 
 noisefloor_addon.register()
 result = unittest.main(argv=["test_addon.py", *arguments[1:]], exit=False).result

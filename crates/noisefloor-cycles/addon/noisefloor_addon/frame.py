@@ -1,17 +1,35 @@
-"""One view layer of one frame: Cycles renders batches of samples of the open tiles, and noisefloor says which
-tiles stay open."""
+"""One view layer of one frame: Cycles renders pairs of pictures, by its own adaptive sampling, with thresholds that fall,
+until nobody sees what is wrong with all of them together.
 
+The threshold says where samples go, pixel by pixel; noisefloor says when they are enough, and in which squares of the
+picture more are needed. Every sample counts in the end."""
+
+import hashlib
+import math
 import time
 
 import bpy
 import noisefloor
 import numpy
 
-from . import denoise, passes, sampling, settings
+from . import judging, passes, sampling
 from .host import rectangles
 
-SAMPLES, NOISE = "noisefloor Samples", "noisefloor Visible Noise"
-NOISY, ALBEDO, NORMAL = "Noisy Image", "Denoising Albedo", "Denoising Normal"
+SAMPLES, NOISE, LOST = "noisefloor Samples", "noisefloor Visible Noise", "noisefloor JOD Lost"
+NOISY, COUNT = "Noisy Image", "Debug Sample Count"
+COARSEST, FINEST = 0.2, 0.001
+# Edge of the cells in which squares of 64 pixels that overlap by half meet
+CELL = 32
+# What is aimed at, as a share of what may be seen, and the least step towards it; as noisefloor.Tuning does
+AIM, LEAST_STEP = 0.9, 1.25
+# Fewer samples are not worth a call of Cycles, which looks at its threshold after 16
+FEWEST = 16
+
+
+def film_rate(scene):
+    """Frames per second, if the noise of an animation is new in every frame; None if it is not, or slower than a film."""
+    rate = scene.render.fps / scene.render.fps_base
+    return rate if scene.cycles.use_animated_seed and rate >= 10 else None
 
 
 class Frame:
@@ -41,17 +59,18 @@ class Frame:
             f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
         )
         self.film = self._film()
-        self.session = noisefloor.Session(
-            *self.size,
-            settings.oracle(self.settings),
-            settings.params(self.scene, sampling.BATCH, shown, self.film),
-        )
-        self.sums = passes.Sums(*self.size)
+        self.fewest = self.scene.cycles.adaptive_min_samples
+        self.judge = judging.Judge(self.scene, shown, self.film)
+        self.tuning = noisefloor.Tuning(threshold=(COARSEST, FINEST))
+        self.halves = passes.Sums(*self.size), passes.Sums(*self.size)
+        # The sum of 1/threshold² of the pictures that each cell has, and how far it is from what may be seen
+        cells = -(-self.size[1] // CELL), -(-self.size[0] // CELL)
+        self.effort, self.ratio = numpy.zeros(cells), numpy.full(cells, numpy.inf)
+        self.excess, self.reason, self.thresholds = None, None, []
         self.begun, self.sampled = time.monotonic(), 0
-        self.tiles = self.session.open_tiles
         # What the windows draw meanwhile, and how often it has changed
         self.shown, self.shows = numpy.zeros((*self.size[::-1], 4), numpy.float32), 0
-        self.denoiser = self._denoiser(depsgraph) if self.scene.cycles.use_denoising else None
+        self._add_passes(depsgraph)
 
     def _film(self):
         """The frames per second of the animation that is rendered, whose noise is new in every frame; None for a
@@ -65,29 +84,26 @@ class Frame:
                 "the samples to vanish. Use Animated Seed (the clock beside Seed), so that noisefloor judges them as a film",
             )
             return None
-        render = self.scene.render
-        rate = render.fps / render.fps_base
-        # What is slower is a row of stills
-        return rate if rate >= 10 else None
+        return film_rate(self.scene)
 
-    def _denoiser(self, depsgraph):
-        """The library that denoises the picture; Cycles is told to render what it needs."""
-        found = denoise.library()
-        if found is None:
+    def _add_passes(self, depsgraph):
+        """Cycles is told to render what denoising and the weights of pictures need."""
+        layer, wanted = depsgraph.view_layer_eval.cycles, [(COUNT, 1, "X")]
+        layer.pass_debug_sample_count = True
+        if self.scene.cycles.use_denoising and self.judge.library is None:
             self.engine.report(
                 {"WARNING"}, "noisefloor does not denoise: this Blender has no Open Image Denoise"
             )
-            return None
-        if self.scene.cycles.denoising_input_passes != "RGB":
-            depsgraph.view_layer_eval.cycles.denoising_store_passes = True
-            rendered = self.engine.get_result().layers[self.layer].passes.keys()
-            for name, channels in [(NORMAL, "XYZ"), (ALBEDO, "RGB")]:
-                if name not in rendered:
-                    self.engine.add_pass(name, 3, channels, layer=self.layer)
-        return found
+        if self.judge.library and self.scene.cycles.denoising_input_passes != "RGB":
+            layer.denoising_store_passes = True
+            wanted += [(judging.NORMAL, 3, "XYZ"), (judging.ALBEDO, 3, "RGB")]
+        rendered = self.engine.get_result().layers[self.layer].passes.keys()
+        for name, channels, letters in wanted:
+            if name not in rendered:
+                self.engine.add_pass(name, channels, letters, layer=self.layer)
 
     def run(self, report):
-        """Renders until every tile is done; calls report(frame) after each batch."""
+        """Renders until every square is done; calls report(frame) after each picture."""
         render, cycles = self.engine.render, self.scene.cycles
         border = [
             "use_border",
@@ -102,61 +118,95 @@ class Frame:
         owned = [(render, name) for name in border] + [(cycles, name) for name in every]
         before = [(owner, name, getattr(owner, name)) for owner, name in owned]
         try:
-            while not self.session.done:
-                ended = self._round(report)
-                if ended:
-                    self.session.close_all(ended)
+            while self.reason is None:
+                self.reason = self._round(report)
         finally:
             for owner, name, value in before:
                 if getattr(owner, name) != value:
                     setattr(owner, name, value)
 
     def _round(self, report):
-        """A batch of samples for each open tile, and verdicts on those that are due; returns why to end, if
-        so."""
-        # Tiles are open from the first round on, so they have samples alike
-        requests = self.session.requests()
-        tiles = [
-            {
-                "x": t.x,
-                "y": t.y,
-                "width": t.width,
-                "height": t.height,
-                "points": (request.sequence, request.point),
-            }
-            for request in requests
-            for t in [request.tile]
-        ]
-        for region, (points,), members in rectangles(tiles, ["points"]):
-            pictures = self._sample(region, points)
-            if self._cancelled():
-                return "cancelled"
-            self.sums.add(region, sampling.BATCH, pictures)
-            self.sampled += region[2] * region[3] * sampling.BATCH
-            picture = numpy.ascontiguousarray(pictures["Combined"][..., :3])
-            for member in members:
-                tile = requests[member].tile
-                x, y = tile.x - region[0], tile.y - region[1]
-                self.session.push(tile, sampling.BATCH, picture[y : y + tile.height, x : x + tile.width])
-            if not bpy.app.background:
-                self._show(region)
-            report(self)
-            if 0 < self.settings.time_limit < time.monotonic() - self.begun:
-                return "time-limit"
-        self.session.judge()
-        return None
+        """Two more pictures of what is not good enough, and a verdict; returns why to end, if so."""
+        each = self.tuning.next()
+        jobs = self._jobs(each)
+        if not jobs:
+            return "max-spp"
+        parts = list(rectangles(jobs, ["threshold", "samples"]))
+        self.thresholds.append(each)
+        for half, sums in enumerate(self.halves):
+            for number, (region, (threshold, samples), _) in enumerate(parts):
+                left = 0.0
+                if self.settings.time_limit > 0:
+                    # A fair share of what is left, for this picture
+                    left = self.settings.time_limit - (time.monotonic() - self.begun)
+                    if left <= 0:
+                        return "time-limit"
+                    left /= (2 - half) * len(parts) - number
+                pictures, counts = self._sample(region, half, threshold, samples, left)
+                cancelled = self._cancelled()
+                # The last picture may be incomplete then: better than none
+                if not cancelled or not sums.samples.any():
+                    sums.add(region, counts, pictures)
+                    self.sampled += float(counts.sum())
+                if cancelled:
+                    return "cancelled"
+                if not bpy.app.background:
+                    self._show(region)
+                report(self)
+        for job in jobs:
+            self.effort[job["cell"]] += 1 / job["threshold"] ** 2
+        return self._verdict()
+
+    def _jobs(self, each):
+        """What is rendered next: cells, each with a threshold and the most samples. With all that it has, the worst is then
+        as good as after one picture with the threshold `each`; others get as much less as they are better."""
+        jobs, most = [], self.settings.max_samples // 2
+        target, first = 1 / each**2, 0.5 / COARSEST**2
+        for cell in zip(*numpy.nonzero(self.ratio > 1)):
+            y, x = (int(place) * CELL for place in cell)
+            width, height = min(CELL, self.size[0] - x), min(CELL, self.size[1] - y)
+            here = slice(y, y + height), slice(x, x + width)
+            samples = most - int(max(half.samples[here].max() for half in self.halves))
+            wanted = target
+            if self.excess is not None and self.excess.ratio < math.inf:
+                share = math.log(self.ratio[cell] / AIM) / math.log(self.excess.ratio / AIM)
+                last = 1 / self.thresholds[-1] ** 2
+                wanted = self.effort[cell] * max((target / last) ** share, LEAST_STEP)
+                # In whole powers of two, so that neighbours are rendered in one call
+                wanted = min(first * 2 ** math.ceil(math.log2(wanted / first) - 0.1), target)
+            missing = wanted - self.effort[cell]
+            if samples >= FEWEST and missing > 0:
+                threshold = float(f"{missing**-0.5:.3g}")
+                jobs.append(
+                    {"x": x, "y": y, "width": width, "height": height, "cell": cell}
+                    | {"threshold": threshold, "samples": samples}
+                )
+        return jobs
+
+    def _verdict(self):
+        """What is wrong where; returns why to end, if so."""
+        self.excess = self.judge.excess([half.means() for half in self.halves])
+        self.ratio[:] = 0
+        for x, y, width, height, ratio in self.excess.squares():
+            cells = slice(y // CELL, -(-(y + height) // CELL)), slice(x // CELL, -(-(x + width) // CELL))
+            self.ratio[cells] = numpy.maximum(self.ratio[cells], ratio)
+        self.tuning.tell(self.excess.ratio)
+        return self.tuning.ending
 
     def _cancelled(self):
-        """Whether Esc was hit: the last batch may be incomplete then."""
+        """Whether Esc was hit."""
         return self.engine.test_break()
 
-    def _sample(self, region, points):
-        """A batch of samples; points: a sequence, and the first of it."""
+    def _sample(self, region, half, threshold, samples, seconds):
+        """One picture of a region, by Cycles' adaptive sampling: its passes, and the samples of each pixel."""
         x, y, width, height = region
         # For motion blur, Cycles evaluates other frames, and settings that move are as in the file again
         cycles = self.depsgraph.scene_eval.cycles
-        sampling.independent(cycles)
-        sampling.choose(cycles, self.seed, *points, sampling.BATCH)
+        digest = hashlib.blake2b(
+            f"{self.seed} half {half} round {len(self.thresholds)}".encode(), digest_size=4
+        ).digest()
+        sampling.adapt(cycles, int.from_bytes(digest, "little") >> 1, threshold, samples)
+        cycles.time_limit = seconds
         sampling.aim(
             self.engine.render,
             (self.across, self.down),
@@ -167,58 +217,56 @@ class Frame:
         if NOISY in pictures:
             # Where Cycles was to denoise, it leaves the picture for that empty
             pictures["Combined"] = pictures[NOISY]
-        return pictures
+        return pictures, sampling.counts(pictures.pop(COUNT), self.fewest, threshold, samples)
 
     def _show(self, region):
         """Brings the picture that people look at up to date."""
         x, y, width, height = region
         here = slice(y, y + height), slice(x, x + width)
-        self.shown[here] = self.sums.sums["Combined"][here] / numpy.maximum(self.sums.samples[here], 1)
+        samples = sum(half.samples[here] for half in self.halves)
+        sums = sum(half.sums["Combined"][here] for half in self.halves if half.sums)
+        self.shown[here] = sums / numpy.maximum(samples, 1)
         self.shows += 1
 
     def finish(self):
         """Puts all passes into the result, with the two maps; returns the maps."""
-        pictures = self.sums.means()
+        both = passes.Sums.joined(*self.halves)
+        pictures, spp = both.means(), both.samples[..., 0]
         if pictures:
-            pictures["Combined"][..., :3] = self.session.image()
             if NOISY in pictures:
                 pictures[NOISY] = pictures["Combined"].copy()
-            if self.denoiser:
-                guides = pictures.get(ALBEDO), pictures.get(NORMAL)
-                pictures["Combined"][..., :3] = denoise.denoise(
-                    self.denoiser, pictures["Combined"][..., :3], *guides
-                )
-        visible = self.session.visible_noise()
-        if visible is None:
-            visible = numpy.full(self.size[::-1], numpy.nan, numpy.float32)
-        spp = self.session.spp()
-        maps = {SAMPLES: spp, NOISE: numpy.nan_to_num(visible)}
+            if self.judge.library:
+                pictures["Combined"][..., :3] = self.judge.denoise(pictures)
+        pictures[COUNT] = spp / max(spp.max(), 1)
+        left = numpy.full(self.size[::-1], numpy.nan, numpy.float32)
+        if self.excess is not None:
+            left = self.excess.map()
+        maps = {SAMPLES: spp, LOST if self.judge.library else NOISE: numpy.nan_to_num(left)}
         for name in maps:
             self.engine.add_pass(name, 1, "X", layer=self.layer)
         passes.write(self.engine, self.layer, {**pictures, **maps})
-        return spp, visible
+        return spp, left
 
     def progress(self):
         """Share of the samples that are taken, and seconds left; None while unknown."""
-        left = self.session.expected_samples
-        if left is None:
+        if self.excess is None or not self.excess.ratio < math.inf:
             return None, None
+        spp = sum(half.samples for half in self.halves)[..., 0]
+        need = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2 - 1, numpy.ones((CELL, CELL)))
+        left = float((spp * need[: self.size[1], : self.size[0]]).sum())
         seconds = time.monotonic() - self.begun
         return self.sampled / max(self.sampled + left, 1), seconds * left / max(self.sampled, 1)
 
     def summary(self):
         """One line."""
-        stops, spp = self.session.stops(), self.session.spp()
-        done = sum(stop.reason == "converged" for stop in stops)
-        reasons = {}
-        for stop in stops:
-            if stop.reason != "converged":
-                reasons[stop.reason] = reasons.get(stop.reason, 0) + 1
-        others = "".join(f"; {count} ended: {reason}" for reason, count in reasons.items())
-        film = f", {self.film:g} frames a second" if self.film else ""
-        seen = f"{self.settings.people:.0%} of people, {self.settings.viewing}{film}"
+        spp = sum(half.samples for half in self.halves)
+        squares = [ratio for *_, ratio in self.excess.squares()] if self.excess else []
+        done = sum(ratio <= 1 for ratio in squares)
+        ended = "" if self.reason == "found" else f"; ended: {self.reason}"
+        what = "anything wrong" if self.judge.library else "visible noise"
+        thresholds = ", ".join(f"{threshold:.3g}" for threshold in self.thresholds)
         return (
-            f"{done} of {len(stops)} tiles without visible noise ({seen}), "
-            f"{spp.min()} to {spp.max()} samples per pixel, {spp.mean():.0f} on average{others}; "
-            f"{time.monotonic() - self.begun:.0f} s"
+            f"{done} of {len(squares)} squares without {what} ({self.judge.said()}), "
+            f"{spp.min():.0f} to {spp.max():.0f} samples per pixel, {spp.mean():.0f} on average, "
+            f"thresholds {thresholds}{ended}; {time.monotonic() - self.begun:.0f} s"
         )

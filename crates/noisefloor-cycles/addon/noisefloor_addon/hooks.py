@@ -131,12 +131,12 @@ def _render(engine, depsgraph):
         frame.run(report)
     except Exception as caught:  # what there is, is kept
         error = caught
-        frame.session.close_all("failed")
-    spp, visible = frame.finish()
+        frame.reason = "failed"
+    spp, left = frame.finish()
     summary = frame.summary()
     engine.get_result().stamp_data_add_field(f"noisefloor.{frame.layer}", summary)
     print(f"noisefloor: {frame.layer}, frame {frame.scene.frame_current}: {summary}", flush=True)
-    pictures = {"samples": maps.samples_map(spp), "visible noise": maps.noise_map(visible)}
+    pictures = {"samples": maps.samples_map(spp), **maps.left_map(left, frame.judge.library, frame.settings)}
     # An evaluated scene can have only the layer that is rendered
     many = sum(layer.use for layer in depsgraph.scene.view_layers) > 1
     with state.lock:
@@ -157,9 +157,10 @@ def _render(engine, depsgraph):
 
 def _progress(frame):
     share, left = frame.progress()
-    done = frame.tiles - frame.session.open_tiles
     spp = frame.sampled // (frame.size[0] * frame.size[1])
-    text = f"noisefloor: {spp} samples per pixel, {done} of {frame.tiles} tiles done"
+    text = f"noisefloor: {spp:.0f} samples per pixel"
+    if frame.excess:
+        text += f", {frame.excess.ratio:.2f} times what may be seen in the worst place"
     if left is not None:
         text += f", about {int(left) // 60}:{int(left) % 60:02} left"
     return text, share

@@ -29,9 +29,12 @@ def samples_map(spp):
     return heat(spp.astype(float), *((some.min(), max(some.max(), some.min() * 2)) if some.size else (1, 2)))
 
 
-def noise_map(visible):
-    """Map of visible noise, from ¼ to 4 times what is just seen, so that maps can be compared."""
-    return heat(visible, 0.25, 4.0)
+def left_map(left, denoised, settings):
+    """By its name, map of what is left: from ¼ to 4 times what is just seen, or of what may be lost, so that maps can be
+    compared."""
+    if denoised:
+        return {"jod lost": heat(left / settings.lost, 0.25, 4.0)}
+    return {"visible noise": heat(left, 0.25, 4.0)}
 
 
 def png(colours, text):

@@ -26,12 +26,11 @@ class RENDER_PT_noisefloor(bpy.types.Panel):
         column = layout.column()
         column.active = settings.use
         column.prop(settings, "viewing")
-        column.prop(settings, "people", slider=True)
-        column.prop(settings, "min_samples")
+        denoised = context.scene.cycles.use_denoising
+        column.prop(settings, *(["lost"] if denoised else ["people"]), slider=not denoised)
         column.prop(settings, "max_samples")
         column.prop(settings, "time_limit")
         column.prop(context.scene.cycles, "use_denoising", text="Denoise", toggle=False)
-        column.prop(settings, "tile")
         column.prop(settings, "write_maps")
         if hooks.state.summary:
             box = column.box()

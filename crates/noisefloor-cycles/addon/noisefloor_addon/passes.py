@@ -48,7 +48,8 @@ class Sums:
         self.sums = {}
 
     def add(self, region, samples, pictures):
-        """Adds the mean of new samples of each pixel of a region."""
+        """Adds pictures of a region, of which each pixel is the mean of so many new samples, an array of shape (height,
+        width, 1)."""
         x, y, width, height = region
         here = slice(y, y + height), slice(x, x + width)
         first = self.samples[here] == 0
@@ -59,7 +60,16 @@ class Sums:
             if name.startswith(LABELS):
                 numpy.copyto(self.sums[name][here], picture, where=first)
             else:
-                self.sums[name][here] += picture * numpy.float32(samples)
+                self.sums[name][here] += picture * samples
+
+    @classmethod
+    def joined(cls, one, other):
+        """All samples of both."""
+        height, width, _ = one.samples.shape
+        both = cls(width, height)
+        for each in (one, other):
+            both.add((0, 0, width, height), each.samples, each.means())
+        return both
 
     def means(self):
         """The passes by name; 0 where there are no samples."""

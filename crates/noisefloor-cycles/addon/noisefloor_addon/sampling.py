@@ -1,13 +1,14 @@
-"""Which samples Cycles takes. The host of noisefloor-cycles and the add-on share this file, so that both
-take the same.
+"""Which samples Cycles takes: by a number of them, or by its own noise threshold. The host of noisefloor-cycles and the
+add-on share this file.
 
-Each of the two halves of a tile's samples is one pattern of Cycles' Sobol table, scrambled by a seed that
+By a number, each of the two halves of a tile's samples is one pattern of Cycles' Sobol table, scrambled by a seed that
 follows from the number of the half: sample k of a half thereby follows from seed, pixel, half and k, however
 requests are cut. The noise of two halves is hardly correlated (-0.04 in the Cornell box); that of successive
 subsets of one pattern is, since each fills the gaps of those before.
 """
 
 import hashlib
+import math
 
 # Points of Cycles' table; a pattern of its own follows. Older versions of Blender render no part of a longer one
 LONGEST, WITHOUT_PARTS = 8192, 16
@@ -48,6 +49,38 @@ def choose(cycles, seed, sequence, point, length, stream=""):
         cycles.sample_offset, cycles.sample_subset_length = offset, length
     else:
         cycles.samples, cycles.sample_offset = length, offset
+
+
+def adapt(cycles, seed, threshold, samples):
+    """Chooses samples by Cycles' own noise threshold, and no more than so many a pixel; all else as the scene says."""
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold, cycles.samples = True, threshold, samples
+    cycles.seed, cycles.use_animated_seed, cycles.use_denoising = seed, False, False
+    cycles.use_layer_samples, cycles.sample_offset = "IGNORE", 0
+    if hasattr(cycles, "use_sample_subset"):
+        cycles.use_sample_subset = False
+    # Tiles of Cycles' own would go through a file on disk
+    cycles.use_auto_tile = False
+
+
+def counts(shares, fewest, threshold, samples):
+    """Samples of each pixel of a picture that was rendered with these settings, from the pass that has them as shares of the
+    most: an array of the same shape, float32.
+
+    Of how many, Cycles does not say. Pixels stop after whole steps of 16, not before the fewest samples; 0 are as many as
+    Cycles takes on its own."""
+    import numpy
+
+    fewest = fewest or math.ceil(16 / threshold**0.3)
+    first = min((fewest // 16 + 1) * 16, samples)
+    some = numpy.unique(shares[shares > 0])
+    for most in range(first, samples + 1):
+        found = some.astype(numpy.float64) * most
+        whole = found.round()
+        steps = (whole % 16 == 0) | (whole == most)
+        if steps.all() and (whole >= first).all() and numpy.abs(found - whole).max(initial=0) < 1e-3:
+            return (shares * numpy.float32(most)).round()
+    # A picture that was stopped
+    return numpy.maximum(shares * numpy.float32(first), 1)
 
 
 def aim(render, frame, region):

@@ -16,29 +16,30 @@ VIEWING = [
 class Settings(bpy.types.PropertyGroup):
     use: bpy.props.BoolProperty(
         name="Render until nobody sees noise",
-        description="Sample each tile until people stop seeing noise in it, instead of by Cycles' settings",
+        description="Sample by Cycles' noise threshold, which falls where people still see noise, instead of by Cycles' settings",
     )
     viewing: bpy.props.EnumProperty(
         name="Seen on", description="Where the picture will be looked at", items=VIEWING
     )
     people: bpy.props.FloatProperty(
         name="People",
-        description="Share of people who see no noise in a tile when it stops",
+        description="Share of people who see no noise, if the picture is not denoised",
         default=0.95,
         min=0.5,
         max=0.99,
         subtype="FACTOR",
     )
-    min_samples: bpy.props.IntProperty(
-        name="Min Samples",
-        description="Samples per pixel before a tile can stop; more find more light that is seldom found",
-        default=32,
-        min=32,
-        soft_max=1024,
+    lost: bpy.props.FloatProperty(
+        name="JOD Lost",
+        description="What a denoised picture may lose in its worst place, in just-objectionable differences, by a model of "
+        "vision: 0.1 is hard to see even beside the perfect picture",
+        default=0.3,
+        min=0.05,
+        max=2.0,
     )
     max_samples: bpy.props.IntProperty(
         name="Max Samples",
-        description="Samples per pixel at which every tile stops",
+        description="Samples per pixel at which every pixel stops",
         default=4096,
         min=32,
         soft_max=16384,
@@ -49,12 +50,13 @@ class Settings(bpy.types.PropertyGroup):
         min=0,
         unit="TIME_ABSOLUTE",
     )
-    tile: bpy.props.IntProperty(
-        name="Tile",
-        description="Edge in pixels of the tiles that stop as a whole",
-        default=128,
-        min=64,
-        max=512,
+    frames: bpy.props.EnumProperty(
+        name="Frames",
+        description="Which frames Find Noise Threshold looks at",
+        items=[
+            ("current", "This Frame", "The frame that is shown"),
+            ("markers", "Marked Frames", "Frames with a marker in the timeline: one threshold for all, by the hardest"),
+        ],
     )
     write_maps: bpy.props.BoolProperty(
         name="Write Maps and Summary",
@@ -82,21 +84,6 @@ def people(scene, film=None):
     return found
 
 
-def params(scene, batch, shown, film=None):
-    """How tiles are judged; shown: as display.table() says; film: frames per second, or None for a still. Verdicts come
-    after whole batches."""
-    settings = scene.noisefloor
-    most = max(settings.max_samples // batch, 2) * batch
-    return noisefloor.Params(
-        tile=settings.tile,
-        step=batch,
-        min_spp=min(-(-settings.min_samples // batch) * batch, most),
-        max_spp=most,
-        tone_mapping=shown,
-        **people(scene, film),
-    )
-
-
-def still_params(scene, shown):
-    """How finished pictures are judged."""
-    return noisefloor.Params(tile=64, tone_mapping=shown, **people(scene))
+def params(scene, shown, film=None):
+    """How pictures are judged; shown: as display.table() says; film: frames per second, or None for a still."""
+    return noisefloor.Params(tile=64, tone_mapping=shown, **people(scene, film))

@@ -9,10 +9,8 @@ import time
 import bpy
 import noisefloor
 
-from . import denoise, display, hooks, settings
+from . import denoise, display, frame, hooks, judging
 
-COARSEST, FINEST = 0.2, 0.001
-ALBEDO, NORMAL = "Denoising Albedo", "Denoising Normal"
 ENDINGS = {
     "at-finest": "even the finest threshold tried is not enough",
     "unchanged": "a finer threshold changes nothing: Max Samples is reached first, raise it",
@@ -25,12 +23,19 @@ class Search:
 
     def __init__(self, scene):
         self.scene, self.denoised = scene, scene.cycles.use_denoising
-        self.library = denoise.library() if self.denoised else None
-        if self.denoised and self.library is None:
+        if self.denoised and denoise.library() is None:
             raise ValueError("this Blender has no Open Image Denoise: turn Denoise off")
-        self.tuning = noisefloor.Tuning(threshold=(COARSEST, FINEST))
-        self.oracle = settings.oracle(scene.noisefloor)
-        self.params = settings.still_params(scene, display.table(scene))
+        self.tuning = noisefloor.Tuning(threshold=(frame.COARSEST, frame.FINEST))
+        self.before, self.frames, self.film = scene.frame_current, [scene.frame_current], None
+        if scene.noisefloor.frames == "markers":
+            marked = {marker.frame for marker in scene.timeline_markers}
+            self.frames = sorted(marked & set(range(scene.frame_start, scene.frame_end + 1)))
+            if not self.frames:
+                raise ValueError("no frame between the first and the last is marked: add markers in the timeline")
+            self.film = frame.film_rate(scene)
+        self.judge = judging.Judge(scene, display.table(scene), self.film)
+        # Of this step: what was found in frames so far
+        self.found = []
         self.pictures, self.excess, self.begun, self.seconds = [], None, 0.0, 0.0
         self.borrowed = []
 
@@ -41,6 +46,8 @@ class Search:
     def borrow(self):
         """What the next picture is rendered with."""
         scene, layers = self.scene, self.scene.view_layers
+        if scene.frame_current != self.frames[len(self.found)]:
+            scene.frame_set(self.frames[len(self.found)])
         cycles = scene.cycles
         wanted = [
             (scene.noisefloor, "use", False),
@@ -68,6 +75,12 @@ class Search:
             setattr(group, name, value)
         self.borrowed = []
 
+    def end(self):
+        """The frame that was shown before."""
+        self.give_back()
+        if self.scene.frame_current != self.before:
+            self.scene.frame_set(self.before)
+
     def take(self):
         """The picture that was rendered; after the second, what they say."""
         rendered, hooks.state.rendered = hooks.state.rendered, {}
@@ -80,26 +93,24 @@ class Search:
         if len(self.pictures) < 2:
             return
         pictures, self.pictures = self.pictures, []
-        noisy = [picture["Combined"][..., :3] for picture in pictures]
-        denoised = None
-        if self.denoised:
-            denoised = tuple(
-                denoise.denoise(self.library, radiance, picture.get(ALBEDO), picture.get(NORMAL))
-                for radiance, picture in zip(noisy, pictures)
-            )
-        try:
-            self.excess = noisefloor.excess(*noisy, oracle=self.oracle, params=self.params, denoised=denoised)
-        except noisefloor.PictureError as error:
-            if "identical" not in str(error):
-                raise
-            raise ValueError("two pictures of different seeds are the same: there is no noise to see") from error
-        self.last, self.seconds = self.seconds, 0.0
+        self.found.append(self.judge.excess(pictures))
+        # The first setting is tried in all frames, the others in those that were hard, until one fails
+        first, fails = not self.tuning.steps, self.found[-1].ratio > 1
+        if len(self.found) < len(self.frames) and (first or not fails):
+            return
+        found, self.found = self.found, []
+        hard = sorted(range(len(found)), key=lambda place: -found[place].ratio)
+        order = hard if first else [hard[0], *(place for place in range(len(self.frames)) if place != hard[0])]
+        self.frames = [self.frames[place] for place in order]
+        self.excess, self.last, self.seconds = found[hard[0]], self.seconds / len(found), 0.0
         self.tuning.tell(self.excess)
 
     def status(self):
         """One line on how far it is."""
         steps = self.tuning.steps
         text = f"noisefloor: picture {len(self.pictures) + 1} of 2"
+        if len(self.frames) > 1:
+            text += f" of frame {self.frames[len(self.found)]}"
         if steps:
             text += f"; {steps[-1][0]:.3g} leaves {steps[-1][1]:.2f} times what may be seen"
         return text
@@ -115,6 +126,10 @@ class Search:
             if self.denoised
             else f"{self.scene.noisefloor.people:.0%} of people see no noise"
         )
+        if len(self.frames) > 1:
+            people += f", frame {self.frames[0]} is the hardest of {len(self.frames)}"
+        if self.film:
+            people += f", at {self.film:g} frames a second"
         # One picture with the setting takes what both took with a coarser one
         share = (self.tuning.steps[-1][0] / self.tuning.setting) ** 2
         return f"{self.tuning.setting:.3g}: {people}; about {self.last * share:.0f} s a frame"
@@ -136,14 +151,14 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
         """All at once: without windows, and from scripts."""
         try:
             search = Search(context.scene)
-            while not search.done:
-                search.borrow()
-                try:
+            try:
+                while not search.done:
+                    search.borrow()
                     bpy.ops.render.render()
-                finally:
-                    search.give_back()
-                search.take()
-                print(search.status(), flush=True)
+                    search.take()
+                    print(search.status(), flush=True)
+            finally:
+                search.end()
             self.report({"INFO"}, self.tell(search.finish()))
         except (ValueError, noisefloor.Error) as error:
             self.report({"ERROR"}, f"noisefloor: {error}")
@@ -178,7 +193,6 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
             return {"PASS_THROUGH"}
         try:
             if hooks.state.ended == "cancelled":
-                self.search.give_back()
                 return self.end(context, {"CANCELLED"})
             self.search.take()
             if not self.search.done:
@@ -187,11 +201,11 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
             self.report({"INFO"}, self.tell(self.search.finish()))
             return self.end(context, {"FINISHED"})
         except (ValueError, noisefloor.Error) as error:
-            self.search.give_back()
             self.report({"ERROR"}, f"noisefloor: {error}")
             return self.end(context, {"CANCELLED"})
 
     def end(self, context, how):
+        self.search.end()
         context.window_manager.event_timer_remove(self.timer)
         context.workspace.status_text_set(None)
         return how
@@ -199,5 +213,8 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
 
 def draw(panel, context):
     """Beside Cycles' own field."""
-    if context.scene.cycles.use_adaptive_sampling:
+    scene = context.scene
+    if scene.cycles.use_adaptive_sampling:
         panel.layout.operator(RENDER_OT_noisefloor_threshold.bl_idname, icon="VIEWZOOM")
+        if scene.timeline_markers:
+            panel.layout.prop(scene.noisefloor, "frames")
