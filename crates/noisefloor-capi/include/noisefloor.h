@@ -331,8 +331,8 @@ NfStatus nf_session_judge(const NfSession *session,
                           size_t *newly_done);
 
 // As nf_session_new, for pictures that are denoised before anyone sees them: a tile is done when what denoise makes of
-// the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, by the
-// vision model; nobody has been asked about denoised pictures. Both halves of the samples are denoised apart, so a
+// the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, 19 of 20 tiles
+// by the vision model; nobody has been asked about denoised pictures. See also nf_session_undenoised. Both halves of the samples are denoised apart, so a
 // verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 // NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 // NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
@@ -347,11 +347,18 @@ NfStatus nf_session_new_denoised(size_t width,
                                  const NfParams *params,
                                  NfSession **session);
 
-// Just-objectionable differences that each denoised tile has lost, by its last verdict: a double for each tile, NaN
+// Just-objectionable differences that each tile to be shown has lost, by its last verdict: a double for each tile, NaN
 // before the first. NF_STATUS_UNAVAILABLE if the session has no denoiser.
 NfStatus nf_session_jods_lost(const NfSession *session,
                               double *lost,
                               size_t capacity);
+
+// Which tiles are to be shown as rendered instead of denoised: their noise has lost no more than is allowed, and what the
+// denoiser makes of them has. A bool for each tile; false before the first verdict. NF_STATUS_UNAVAILABLE if the session
+// has no denoiser.
+NfStatus nf_session_undenoised(const NfSession *session,
+                               bool *undenoised,
+                               size_t capacity);
 
 // A .cube file: a 1D LUT, a 3D LUT, or a 1D one before a 3D one. text is its content, bytes long. input says how
 // radiance is encoded before it: "linear" (also NULL), "srgb", "acescct", or "log2:LOW,HIGH" for stops from middle grey

@@ -6,9 +6,12 @@ use crate::params::NfParams;
 use crate::session::{Judging, NfSession};
 use crate::status::{Failure, NfStatus, guard};
 use noisefloor::{Params, Rgb, Schedule, TileGrid, source::FirstHits};
-use noisefloor_denoise::{AuxiliaryPictures, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
+use noisefloor_denoise::{
+    AuxiliaryPictures, DenoiseError, DenoisedQuality, DenoisedRecord, Denoiser, NoisyPicture,
+};
 use std::cell::Cell;
 use std::ffi::c_void;
+use std::mem::MaybeUninit;
 use std::sync::{Arc, PoisonError};
 
 /// Denoises a whole picture, noisy, into denoised: each has 3 * width * height floats. albedo and normal are NULL, or
@@ -103,8 +106,8 @@ impl Denoiser for DenoisedBy {
 }
 
 /// As nf_session_new, for pictures that are denoised before anyone sees them: a tile is done when what denoise makes of
-/// the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, by the
-/// vision model; nobody has been asked about denoised pictures. Both halves of the samples are denoised apart, so a
+/// the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, 19 of 20 tiles
+/// by the vision model; nobody has been asked about denoised pictures. See also nf_session_undenoised. Both halves of the samples are denoised apart, so a
 /// verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 /// NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 /// NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
@@ -158,7 +161,7 @@ pub unsafe extern "C" fn nf_session_new_denoised(
     })
 }
 
-/// Just-objectionable differences that each denoised tile has lost, by its last verdict: a double for each tile, NaN
+/// Just-objectionable differences that each tile to be shown has lost, by its last verdict: a double for each tile, NaN
 /// before the first. NF_STATUS_UNAVAILABLE if the session has no denoiser.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_jods_lost(
@@ -166,18 +169,50 @@ pub unsafe extern "C" fn nf_session_jods_lost(
     lost: *mut f64,
     capacity: usize,
 ) -> NfStatus {
+    // SAFETY: promised by the caller.
+    unsafe {
+        of_tiles(session, (lost, capacity), "lost", |record, tile| {
+            record.jods_lost.get(tile).copied().unwrap_or(f64::NAN)
+        })
+    }
+}
+
+/// Which tiles are to be shown as rendered instead of denoised: their noise has lost no more than is allowed, and what the
+/// denoiser makes of them has. A bool for each tile; false before the first verdict. NF_STATUS_UNAVAILABLE if the session
+/// has no denoiser.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_undenoised(
+    session: *const NfSession,
+    undenoised: *mut bool,
+    capacity: usize,
+) -> NfStatus {
+    // SAFETY: promised by the caller.
+    unsafe {
+        of_tiles(session, (undenoised, capacity), "undenoised", |record, tile| {
+            record.undenoised.get(tile) == Some(&true)
+        })
+    }
+}
+
+/// Writes what is recorded of each tile.
+unsafe fn of_tiles<T>(
+    session: *const NfSession,
+    (values, capacity): (*mut T, usize),
+    name: &str,
+    of: impl Fn(&DenoisedRecord, usize) -> T,
+) -> NfStatus {
     guard(|| {
         let session = handle::get(session)?;
-        // SAFETY: promised by the caller.
-        let room = unsafe { border::array_mut(lost, capacity, session.grid.len(), "lost") }?;
+        // SAFETY: promised by the caller, but for the values, which need not be any before.
+        let room = unsafe {
+            border::array_mut::<MaybeUninit<T>>(values.cast(), capacity, session.grid.len(), name)
+        }?;
         let judged = session.lock()?;
         let record = judged.record.as_ref();
         let record =
             record.ok_or_else(|| Failure::new(NfStatus::Unavailable, "the session has no denoiser"))?;
         let record = record.lock().unwrap_or_else(PoisonError::into_inner);
-        for (tile, place) in room.iter_mut().enumerate() {
-            *place = record.jods_lost.get(tile).copied().unwrap_or(f64::NAN);
-        }
+        room.iter_mut().enumerate().for_each(|(tile, place)| _ = place.write(of(&record, tile)));
         Ok(())
     })
 }

@@ -38,6 +38,9 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 ///
 /// The two halves of the film are denoised apart, whole, and [`DenoisedError`] says how wrong the denoised
 /// picture is; the vision model says how many just-objectionable differences (JOD) each tile has lost by that.
+/// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
+/// they are given. [`DenoisedRecord::compose`] shows such tiles as they were rendered.
+///
 /// A verdict takes two denoisings of the whole picture: use a schedule with growing intervals, such as
 /// [`Schedule::Growing`](noisefloor::Schedule::Growing).
 ///
@@ -142,8 +145,10 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         let count = view.film.grid().len();
         let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
         record.jods_lost.resize(count, f64::NAN);
+        record.undenoised.resize(count, false);
         for (tile, judged) in tiles.iter().zip(&judged) {
             record.jods_lost[tile.index] = judged.lost;
+            record.undenoised[tile.index] = judged.undenoised;
         }
         record.error = Some(error);
         record.seconds += began.elapsed().as_secs_f64();
@@ -167,6 +172,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
 struct Judged {
     verdict: Verdict,
     lost: f64,
+    undenoised: bool,
 }
 
 /// The vision model, and room for it.
@@ -194,17 +200,37 @@ impl Eyes<'_> {
         }
         Some((spp as f64 * low.powf(-1.0 / decay)).clamp(1.0, 1e15).ceil() as u64)
     }
+
+    /// The samples per pixel at which one of both, what is wrong with the denoised picture and the noise, is weak enough.
+    fn needed_by_either(
+        &mut self,
+        [denoised, noise]: [&DenoisedError; 2],
+        limit: f64,
+        spp: u64,
+    ) -> Option<u64> {
+        let needs =
+            [self.needed(denoised, limit, (spp, DENOISED_DECAY)), self.needed(noise, limit, (spp, DECAY))];
+        needs.into_iter().flatten().min()
+    }
 }
 
 fn judge_tile(view: &View<'_>, error: &DenoisedError, tile: Tile, limit: f64, eyes: &mut Eyes<'_>) -> Judged {
-    let spp = view.film.spp(tile.index);
+    let (film, spp) = (view.film, view.film.spp(tile.index));
+    let evidence = film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
     let here = error.part(tile);
     let lost = eyes.lost(&here, 1.0);
-    let expected_spp =
-        if lost <= limit { Some(spp) } else { eyes.needed(&here, limit, (spp, DENOISED_DECAY)) };
-    let evidence = view.film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
-    let converged = evidence && lost <= limit;
-    Judged { verdict: Verdict::new(converged).expecting(expected_spp), lost }
+    if lost <= limit {
+        return Judged { verdict: Verdict::new(evidence).expecting(Some(spp)), lost, undenoised: false };
+    }
+    // What a denoiser smears however many samples it gets is done when the noise is: no tile takes more samples denoised
+    let noise = noise_of(film, view.display, tile, here.shown().to_vec());
+    let of_noise = eyes.lost(&noise, 1.0);
+    if of_noise <= limit {
+        let verdict = Verdict::new(evidence).expecting(Some(spp));
+        return Judged { verdict, lost: of_noise, undenoised: evidence };
+    }
+    let verdict = Verdict::new(false).expecting(eyes.needed_by_either([&here, &noise], limit, spp));
+    Judged { verdict, lost, undenoised: false }
 }
 
 /// Samples per pixel, on average, that a picture would take without denoising until no tile has lost more than `limit`
@@ -221,8 +247,7 @@ pub fn spp_without_denoising(
     let tiles: Vec<Tile> = grid.tiles().collect();
     let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
         let shown = tile.rows(grid.width()).flatten().map(|pixel| display.luma(denoised[pixel])).collect();
-        let noise =
-            DenoisedError::of((tile.width, tile.height), shown, noise_of(film, display, tile), display);
+        let noise = noise_of(film, display, tile, shown);
         let mut eyes = Eyes { model: &model, room };
         let spp = eyes.needed(&noise, limit, (film.spp(tile.index), DECAY))?;
         Some(spp as f64 * tile.pixels() as f64)
@@ -253,19 +278,21 @@ pub fn spp_with_denoising(
     let tiles: Vec<Tile> = grid.tiles().collect();
     let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
         let mut eyes = Eyes { model: &model, room };
-        let limit = limit / ESTIMATE_ERRS_BY;
-        let spp = eyes.needed(&error.part(tile), limit, (film.spp(tile.index), DENOISED_DECAY))?;
+        let here = error.part(tile);
+        let noise = noise_of(film, display, tile, here.shown().to_vec());
+        let spp = eyes.needed_by_either([&here, &noise], limit / ESTIMATE_ERRS_BY, film.spp(tile.index))?;
         Some(spp as f64 * tile.pixels() as f64)
     });
     let samples: Option<Vec<f64>> = samples.collect();
     Ok(samples.map(|samples| samples.iter().sum::<f64>() / (size.0 * size.1) as f64))
 }
 
-/// The noise of a tile of the film, as displayed.
-fn noise_of(film: &Film, display: &Display, tile: Tile) -> Vec<f32> {
+/// The noise of a tile of the film, as displayed, on what is shown there.
+fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Vec<f32>) -> DenoisedError {
     let planes = TilePlanes::from_halves(film, display, tile);
     let inner = planes.inner;
     let rows =
         (inner.y..inner.y + inner.height).flat_map(|y| (inner.x..inner.x + inner.width).map(move |x| (y, x)));
-    rows.map(|at| planes.residual[at]).collect()
+    let noise = rows.map(|at| planes.residual[at]).collect();
+    DenoisedError::of((tile.width, tile.height), shown, noise, display)
 }

@@ -1,6 +1,7 @@
 //! What is known of the verdicts on denoised pictures besides the verdicts.
 
 use crate::estimate::DenoisedError;
+use noisefloor::{Rgb, TileGrid};
 
 /// What the last verdicts looked at, for reports.
 #[derive(Clone, Debug, Default)]
@@ -9,6 +10,8 @@ pub struct DenoisedRecord {
     pub error: Option<DenoisedError>,
     /// For each tile, the just-objectionable differences lost when it was last judged; NaN before that.
     pub jods_lost: Vec<f64>,
+    /// Tiles to be shown as rendered: their noise has lost no more than is allowed, and what the denoiser makes of them has.
+    pub undenoised: Vec<bool>,
     /// Seconds spent on denoising and on the estimates from it.
     pub seconds: f64,
     /// Verdicts so far: each takes two denoisings.
@@ -16,29 +19,44 @@ pub struct DenoisedRecord {
 }
 
 impl DenoisedRecord {
+    /// Makes of the denoised picture the one to be shown, row-major: tiles that are [`undenoised`](Self::undenoised) become as
+    /// they were rendered.
+    pub fn compose(&self, grid: TileGrid, rendered: &[Rgb], denoised: &mut [Rgb]) {
+        let tiles = grid.tiles().filter(|tile| self.undenoised.get(tile.index) == Some(&true));
+        for row in tiles.flat_map(|tile| tile.rows(grid.width())) {
+            if let (Some(to), Some(from)) = (denoised.get_mut(row.clone()), rendered.get(row)) {
+                to.copy_from_slice(from);
+            }
+        }
+    }
+
     /// Everything but the error picture: the number of verdicts, the seconds, then the loss of each tile, in eight
-    /// bytes each, little-endian.
+    /// bytes each, little-endian, and whether it is shown as rendered, in one.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(16 + 8 * self.jods_lost.len());
+        let mut bytes = Vec::with_capacity(16 + 9 * self.jods_lost.len());
         bytes.extend((self.verdicts as u64).to_le_bytes());
         bytes.extend(self.seconds.to_le_bytes());
         self.jods_lost.iter().for_each(|lost| bytes.extend(lost.to_le_bytes()));
+        bytes.extend(self.undenoised.iter().map(|&undenoised| u8::from(undenoised)));
         bytes
     }
 
     /// What [`DenoisedRecord::to_bytes`] returned for so many tiles; `None` if it did not.
     pub(crate) fn from_bytes(tiles: usize, bytes: &[u8]) -> Option<Self> {
-        let (words, []) = bytes.as_chunks::<8>() else { return None };
-        let [verdicts, seconds, rest @ ..] = words else { return None };
-        let (verdicts, seconds) = (u64::from_le_bytes(*verdicts), f64::from_le_bytes(*seconds));
+        let (&verdicts, rest) = bytes.split_first_chunk::<8>()?;
+        let (&seconds, rest) = rest.split_first_chunk::<8>()?;
+        let (verdicts, seconds) = (u64::from_le_bytes(verdicts), f64::from_le_bytes(seconds));
         // Before the first verdict there are no tiles
         let expected = if verdicts == 0 { 0 } else { tiles };
-        if rest.len() != expected || !(seconds >= 0.0 && seconds.is_finite()) {
+        let (lost, undenoised) = rest.split_at_checked(8 * expected)?;
+        let flags = undenoised.len() == expected && undenoised.iter().all(|&flag| flag <= 1);
+        if !flags || !(seconds >= 0.0 && seconds.is_finite()) {
             return None;
         }
-        let jods_lost = rest.iter().map(|lost| f64::from_le_bytes(*lost)).collect();
+        let jods_lost = lost.as_chunks().0.iter().map(|lost| f64::from_le_bytes(*lost)).collect();
+        let undenoised = undenoised.iter().map(|&flag| flag == 1).collect();
         let verdicts = usize::try_from(verdicts).ok()?;
-        Some(Self { error: None, jods_lost, seconds, verdicts })
+        Some(Self { error: None, jods_lost, undenoised, seconds, verdicts })
     }
 }
 
@@ -48,15 +66,21 @@ mod tests {
 
     #[test]
     fn what_is_kept_is_restored_and_nothing_else_is() {
-        let record = DenoisedRecord { jods_lost: vec![0.25, 0.5], seconds: 1.5, verdicts: 3, error: None };
+        let undenoised = vec![false, true];
+        let record =
+            DenoisedRecord { jods_lost: vec![0.25, 0.5], undenoised, seconds: 1.5, verdicts: 3, error: None };
         let bytes = record.to_bytes();
         let again = DenoisedRecord::from_bytes(2, &bytes).unwrap();
-        assert_eq!((again.jods_lost, again.seconds, again.verdicts), (record.jods_lost, 1.5, 3));
+        assert_eq!((again.jods_lost, again.undenoised), (record.jods_lost, record.undenoised));
+        assert_eq!((again.seconds, again.verdicts), (1.5, 3));
         assert!(DenoisedRecord::from_bytes(2, &DenoisedRecord::default().to_bytes()).is_some());
         for length in 0..bytes.len() {
             assert!(DenoisedRecord::from_bytes(2, &bytes[..length]).is_none(), "{length}");
         }
         assert!(DenoisedRecord::from_bytes(3, &bytes).is_none());
+        let mut odd = bytes.clone();
+        *odd.last_mut().unwrap() = 2;
+        assert!(DenoisedRecord::from_bytes(2, &odd).is_none());
         let mut odd = bytes;
         odd[8..16].copy_from_slice(&f64::NAN.to_le_bytes());
         assert!(DenoisedRecord::from_bytes(2, &odd).is_none());

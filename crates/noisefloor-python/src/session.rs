@@ -34,8 +34,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 ///     chain: no warning says so then.
 /// denoiser: a function that takes the linear radiance of a whole picture, an array of shape (height, width, 3), and
 ///     returns it denoised. Tiles are then done when the denoised picture has lost at most `lost` just-objectionable
-///     differences (JOD) against the converged one, by the vision model: nobody has been asked about denoised
-///     pictures. Both halves of the samples are denoised apart, so a verdict takes two calls: params is
+///     differences (JOD) against the converged one, 19 of 20 of them, by the vision model: nobody has been asked about
+///     denoised pictures. What a denoiser smears however many samples it gets is done when its noise is (undenoised). Both halves of the samples are denoised apart, so a verdict takes two calls: params is
 ///     Params(schedule="growing", step=48, min_spp=48) unless given. What it returns must hang on its arguments
 ///     alone. It takes the place of oracle, and cannot use sessions.
 /// first_hits: ((albedo, normal), (albedo, normal)), a pair for each half, independent of each other: arrays of shape
@@ -367,6 +367,15 @@ impl PySession {
         let record = record.lock().unwrap_or_else(PoisonError::into_inner);
         let lost = self.spread(|tile| record.jods_lost.get(tile).copied().unwrap_or(f64::NAN));
         plane(py, self.size(), lost).map(Some)
+    }
+
+    /// Where the picture to be shown is as rendered instead of denoised: bool of shape (height, width). The noise has lost no
+    /// more than is allowed there, and what the denoiser makes of it has. None without a denoiser.
+    fn undenoised<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<bool>>>> {
+        let guard = self.attached(py)?;
+        let Some(record) = &guard.0.record else { return Ok(None) };
+        let record = record.lock().unwrap_or_else(PoisonError::into_inner);
+        plane(py, self.size(), self.spread(|tile| record.undenoised.get(tile) == Some(&true))).map(Some)
     }
 
     /// Writes a snapshot to a file, for resuming the session. The file is whole or not there.

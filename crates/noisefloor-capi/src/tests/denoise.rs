@@ -141,6 +141,10 @@ fn stops_are_those_of_rust_and_go_on_after_a_resume() {
     }
     assert_eq!(spp(&session), expected);
     assert_eq!(jods_lost(&session), record.lock().unwrap().jods_lost);
+    let mut undenoised = vec![true; expected.len()];
+    // SAFETY: a living handle, and an array of the size given.
+    let status = unsafe { nf_session_undenoised(session.0, undenoised.as_mut_ptr(), undenoised.len()) };
+    assert_eq!((status, undenoised), (NfStatus::Ok, record.lock().unwrap().undenoised.clone()));
     // Two halves a verdict
     assert!(told.calls.get() > 0 && told.calls.get().is_multiple_of(2), "{:?}", told.calls);
 

@@ -53,16 +53,22 @@ fn a_plain_wall_is_done_sooner_when_denoised_and_a_smeared_one_is_not() {
     let mut denoised = session(Simple::Bilateral(0.3));
     let stops = run(&mut denoised).unwrap();
     assert!([2, 5].into_iter().all(|tile| stops[tile] < plain[tile]), "{stops:?} and {plain:?}");
-    // The filter smears the stripes, however many samples they have
-    let reasons: Vec<StopReason> = denoised.stops().map(|stop| stop.reason).collect();
-    assert_eq!([reasons[0], reasons[3]], [StopReason::MaxSpp; 2], "{stops:?}");
+    // The filter smears the stripes, however many samples they have: they are done when their noise is, by verdicts at
+    // other samples
+    assert!([0, 3].into_iter().all(|tile| stops[tile] < 2 * plain[tile]), "{stops:?} and {plain:?}");
 
     // What is recorded beside: the error at the end
     let record = denoised.criterion().record();
     let record = record.lock().unwrap();
     assert_eq!(record.error.as_ref().unwrap().size(), SIZE);
     let allowed = 0.1 / ESTIMATE_ERRS_BY;
-    assert!(record.jods_lost[2] <= allowed && record.jods_lost[0] > allowed, "{:?}", record.jods_lost);
+    assert!(record.jods_lost.iter().all(|&lost| lost <= allowed), "{:?}", record.jods_lost);
+    assert_eq!([0, 2, 3, 5].map(|tile| record.undenoised[tile]), [true, false, true, false]);
+    // They are shown as they were rendered
+    let grid = denoised.film().grid();
+    let (rendered, mut shown) = (denoised.film().image(), vec![[0.0; 3]; SIZE.0 * SIZE.1]);
+    record.compose(grid, &rendered, &mut shown);
+    assert!(shown[0] == rendered[0] && shown[SIZE.0 - 1] == [0.0; 3]);
     assert!(record.verdicts > 0 && record.seconds > 0.0);
 }
 
@@ -74,7 +80,9 @@ fn nineteen_of_twenty_tiles_that_stop_have_lost_no_more_than_is_allowed() {
         let mut session = session(Simple::Bilateral(0.1));
         run_with(&mut session, seed).unwrap();
         let display = session.display_so_far();
-        let denoised = Simple::Bilateral(0.1).of(&session.film().image());
+        let rendered = session.film().image();
+        let mut denoised = Simple::Bilateral(0.1).of(&rendered);
+        session.criterion().record().lock().unwrap().compose(session.film().grid(), &rendered, &mut denoised);
         let error = DenoisedError::known(SIZE, &denoised, &truth(), &display).unwrap();
         let (eyes, mut room) = (VisionModel::new(&session.params().viewing), VisionWorkspace::default());
         for stop in session.stops().filter(|stop| stop.reason == StopReason::Converged) {
@@ -131,9 +139,10 @@ fn the_need_with_a_denoiser_is_that_of_the_denoised_picture() {
         let found = with(Simple::Nothing).unwrap().unwrap();
         assert!((found / needed).ln().abs() < tolerance, "{found} by {spp}, and {needed}");
         assert!(with(Simple::Fails).is_err());
-        // A filter that smears the stripes however many samples there are
-        let smeared = with(Simple::Bilateral(0.3)).unwrap();
-        assert!(smeared.is_none_or(|smeared| smeared > found), "{smeared:?}");
+        // A filter that smears the stripes however many samples there are takes no more than none; its noise is seen on what
+        // it has smeared
+        let smeared = with(Simple::Bilateral(0.3)).unwrap().unwrap();
+        assert!(smeared < 1.2 * found, "{smeared} and {found}");
     }
 }
 

@@ -79,7 +79,7 @@ pub struct RenderArgs {
     force: bool,
     /// `draft` for a quarter of the samples that people ask for: noise that is twice as strong as what is
     /// just seen (with --denoise, 0.9 JOD lost). `final` for two verdicts in a row, so that fewer tiles
-    /// stop by luck; with `--denoise oidn` it takes a third less time, or better, in most scenes.
+    /// stop by luck; with `--denoise oidn` it takes a third less time, or better, in half of the scenes tried.
     #[arg(long, value_enum)]
     preset: Option<Preset>,
     /// Judge the picture that this denoiser makes of the samples, and write it: `oidn`, Open Image Denoise
@@ -294,7 +294,7 @@ impl RenderArgs {
         };
         if by_oracle && self.preset == Some(Preset::Final) && !self.quiet {
             note!(
-                "a denoised picture takes a third less time, or better, in most scenes: add --denoise oidn"
+                "a denoised picture takes a third less time, or better, in half of the scenes tried: add --denoise oidn"
             );
         }
         let (source, resources) = self.renderer.check(self.scene.as_deref())?;

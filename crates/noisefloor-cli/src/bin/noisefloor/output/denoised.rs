@@ -41,6 +41,8 @@ pub(super) struct DenoisedReport {
     /// Just-objectionable differences lost, by the estimate when a tile was last judged: the most of any
     /// tile.
     jods_lost: Option<f64>,
+    /// Tiles that are shown as rendered, since their noise has lost less than what the denoiser makes of them.
+    undenoised_tiles: usize,
     /// Samples per pixel that the picture would need without denoising, on average, to lose as little as is
     /// allowed; null if that is out of sight for a tile.
     spp_without: Option<f64>,
@@ -95,6 +97,7 @@ impl Denoised {
             seconds: record.seconds,
             picture_seconds: self.picture_seconds,
             jods_lost: lost.max_by(f64::total_cmp),
+            undenoised_tiles: record.undenoised.iter().filter(|&&undenoised| undenoised).count(),
             spp_without: self.spp_without,
         }
     }
@@ -129,8 +132,9 @@ impl Output {
         let (noisy, wants) = (session.film().image(), denoised.denoiser.wants());
         let picture = NoisyPicture::new((width, height), &noisy);
         let guide = denoised.guide.as_ref();
-        let image =
+        let mut image =
             denoised.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))?;
+        denoised.record().compose(grid, &noisy, &mut image);
         let display = session.display_so_far();
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
         let viewing = session.params().viewing;
@@ -158,8 +162,16 @@ impl Output {
     /// Says what denoising was worth.
     pub(super) fn say_denoised(&self, session: &Session) -> Result<(), NotSaid> {
         let Some(denoised) = &self.denoised else { return Ok(()) };
-        let DenoisedReport { denoiser, guided, verdicts, seconds, picture_seconds, jods_lost, spp_without } =
-            denoised.report();
+        let DenoisedReport {
+            denoiser,
+            guided,
+            verdicts,
+            seconds,
+            picture_seconds,
+            jods_lost,
+            undenoised_tiles,
+            spp_without,
+        } = denoised.report();
         let grid = session.film().grid();
         let spp = session.film().total_samples() as f64 / (grid.width() * grid.height()) as f64;
         let without = spp_without.map_or_else(
@@ -168,6 +180,12 @@ impl Output {
         );
         let with = if guided { " with albedo and normals" } else { "" };
         say!("{spp:.0} spp denoised by {denoiser}{with}; {without}")?;
+        if undenoised_tiles > 0 {
+            say!(
+                "{undenoised_tiles} of {} tiles are shown as rendered: the denoiser takes away more than their noise",
+                grid.len()
+            )?;
+        }
         if let Some(lost) = jods_lost {
             say!(
                 "the worst tile has lost {lost:.3} JOD, by an estimate that 19 of 20 tiles exceed by less than \
