@@ -108,7 +108,8 @@ impl Node {
         };
         let near = |i: usize| at(i, ray.enter[i]);
         let far = |i: usize| at(i, 1 - ray.enter[i]);
-        let enter = _mm256_max_ps(_mm256_max_ps(near(0), near(1)), _mm256_max_ps(near(2), _mm256_setzero_ps()));
+        let enter =
+            _mm256_max_ps(_mm256_max_ps(near(0), near(1)), _mm256_max_ps(near(2), _mm256_setzero_ps()));
         let leave = _mm256_min_ps(_mm256_min_ps(far(0), far(1)), far(2));
         let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LATE));
         let leave = _mm256_min_ps(leave, _mm256_set1_ps(t_max));
