@@ -1,15 +1,16 @@
-//! Ray intersection: a bounding volume hierarchy, built by `obvhs` and traversed four boxes and four
-//! surfaces at a time. `docs/benchmarks/bvh.md` says why.
+//! Ray intersection: a bounding volume hierarchy, traversed eight boxes and four surfaces at a time.
+//! `docs/benchmarks/bvh.md` says why.
 //!
 //! [`shape`] is what goes in, [`leaf`] and [`node`] are what a ray is tested against, [`tree`] is a hierarchy of
-//! boxes. [`bvh`] is one over surfaces, [`build`] makes it and [`traverse`] walks it. [`hierarchy`] is a scene's:
+//! boxes, and [`cut`] how it is built. [`bvh`] is one over surfaces, [`build`] makes it and [`traverse`] walks it. [`hierarchy`] is a scene's:
 //! its own surfaces, and instances of objects, each of which has a hierarchy in coordinates of its own.
 
+mod aabb;
 mod build;
 mod bvh;
+mod cut;
 mod hierarchy;
 mod leaf;
-mod median;
 mod node;
 mod shape;
 mod traverse;
@@ -23,4 +24,4 @@ mod tests;
 pub(crate) use bvh::{Bvh, HitShape};
 pub(crate) use hierarchy::{Hierarchy, Hit, Instance, Stack};
 pub(crate) use leaf::Spot;
-pub(crate) use shape::{Shape, bounds};
+pub(crate) use shape::{Shape, Surface, bounds};

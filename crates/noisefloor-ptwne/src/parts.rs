@@ -1,6 +1,6 @@
 //! What a builder collects, and a scene is made of.
 
-use crate::accel::{Instance, Shape};
+use crate::accel::{Instance, Surface};
 use crate::camera::Optics;
 use crate::environment::{Environment, EnvironmentMap};
 use crate::geometry::Geometry;
@@ -34,7 +34,7 @@ pub(crate) struct Parts {
     pub(crate) optics: Optics,
     pub(crate) materials: Vec<CompiledMaterial>,
     /// Of objects in coordinates of their own.
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) surfaces: Vec<Surface>,
     /// In the order of their surfaces.
     pub(crate) objects: Vec<Object>,
     pub(crate) instances: Vec<Instance>,

@@ -1,6 +1,6 @@
 //! A scene, ready to be rendered.
 
-use crate::accel::{self, Bvh, Hierarchy, Hit};
+use crate::accel::{self, Bvh, Hierarchy, Hit, Surface};
 use crate::camera::{Camera, Lens, Optics};
 use crate::checks::check_memory;
 use crate::environment::{Dome, Environment, Map};
@@ -13,13 +13,14 @@ use crate::math::Vec3;
 use crate::parts::{Object, Parts, Surroundings};
 use crate::texture::{Texture, twice};
 use noisefloor::source::SourceIdentity;
+use std::ops::Range;
 
 /// A scene whose centre is farther from the origin than this many of its radii is moved there: `f32` keeps 24
 /// bits of each coordinate, and those that only say where the scene is are lost to its detail.
 const FAR: f32 = 16.0;
 
 /// Bytes that building the hierarchy takes for each surface and instance at most, besides the surfaces.
-const BUILDING: usize = 640;
+const BUILDING: usize = 320;
 
 /// What surrounds a scene, prepared for lookup.
 #[derive(Clone, Debug)]
@@ -54,10 +55,15 @@ pub struct Scene {
 
 impl Scene {
     pub(crate) fn new(name: String, camera: Camera, parts: Parts) -> Result<Self, SceneError> {
-        let Parts { surroundings, optics, materials, mut shapes, geometry, mut lights, .. } = parts;
+        let Parts { surroundings, optics, materials, mut surfaces, geometry, mut lights, .. } = parts;
         let Parts { emission_textures, objects, mut instances, .. } = parts;
-        check_memory((shapes.len() + instances.len()).saturating_mul(BUILDING))?;
-        let own: Vec<u32> = own(shapes.len(), &objects);
+        check_memory((surfaces.len() + instances.len()).saturating_mul(BUILDING))?;
+        let inside = |object: &Object| {
+            let Range { start, end } = object.surfaces;
+            Bvh::new(surfaces[start as usize..end as usize].to_vec())
+        };
+        let inside: Vec<Bvh> = objects.iter().map(inside).collect();
+        keep_own(&mut surfaces, &objects);
 
         // Move far-away scenes to the origin
         let mut origin = Vec3::ZERO;
@@ -65,20 +71,18 @@ impl Scene {
             let [middle, half] = instance.around(objects[instance.object()].bounds);
             [middle - half, middle + half]
         });
-        let boxes = boxes.chain(accel::bounds(own.iter().map(|prim| &shapes[*prim as usize])));
+        let boxes = boxes.chain(accel::bounds(surfaces.iter().map(|surface| &surface.shape)));
         if let Some([low, high]) = boxes.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]) {
             let centre = 0.5 * (low + high);
             if centre.abs().max_element() > FAR * 0.5 * (high - low).length() {
                 origin = centre;
                 let by = -glam::Vec3::from(origin);
-                own.iter().for_each(|prim| shapes[*prim as usize] = shapes[*prim as usize].translated(by));
+                surfaces.iter_mut().for_each(|surface| surface.shape = surface.shape.translated(by));
                 instances.iter_mut().for_each(|instance| instance.translate(-origin));
                 lights.iter_mut().for_each(|light| light.translate(-origin));
             }
         }
-        let inside = |object: &Object| Bvh::new(&shapes, &object.surfaces.clone().collect::<Vec<u32>>());
-        let bvh = Hierarchy::new(Bvh::new(&shapes, &own), objects.iter().map(inside).collect(), instances);
-        drop((shapes, own));
+        let bvh = Hierarchy::new(Bvh::new(surfaces), inside, instances);
 
         let (sky, sun) = surround(surroundings, &mut lights);
         let has_opacity = geometry.groups.iter().any(|g| materials[g.material as usize].lets_pass());
@@ -212,16 +216,13 @@ impl Scene {
     }
 }
 
-/// The surfaces that are of no object.
-fn own(surfaces: usize, objects: &[Object]) -> Vec<u32> {
-    let mut own = Vec::with_capacity(surfaces);
-    let mut next = 0;
-    for object in objects {
-        own.extend(next..object.surfaces.start);
-        next = object.surfaces.end;
-    }
-    own.extend(next..surfaces as u32);
-    own
+/// Keeps the surfaces that are of no object.
+fn keep_own(surfaces: &mut Vec<Surface>, objects: &[Object]) {
+    let mut next = objects.iter().map(|object| &object.surfaces).peekable();
+    surfaces.retain(|surface| {
+        while next.next_if(|object| object.end <= surface.prim).is_some() {}
+        next.peek().is_none_or(|object| surface.prim < object.start)
+    });
 }
 
 /// What surrounds a scene, and the index of the sun; its lights are added to `lights`, and come last.

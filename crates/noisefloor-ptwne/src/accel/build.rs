@@ -1,10 +1,11 @@
 //! Building the hierarchy of surfaces.
 
+use super::aabb::Aabb;
 use super::bvh::Bvh;
+use super::cut::Bounded;
 use super::leaf::{EDGE, Leaf, NO_PACK, Pack, Round};
-use super::shape::{Shape, dual};
-use super::tree::Tree;
-use obvhs::aabb::Aabb;
+use super::shape::{Shape, Surface, bounds, dual};
+use super::tree::{Leaves, Tree};
 
 /// The least by which an edge is widened, relative to the scene's largest coordinate: four roundings. It
 /// exceeds [`EDGE`] for narrow surfaces: needles, and small triangles far from the origin.
@@ -13,51 +14,58 @@ const MIN_WIDENING: f64 = 2.4e-7;
 const MAX_WIDENING: f64 = 0.01;
 
 impl Bvh {
-    /// Builds the hierarchy over those of `shapes` that `prims` names; planar ones must have an area.
-    pub(crate) fn new(shapes: &[Shape], prims: &[u32]) -> Self {
-        let boxes: Vec<Aabb> = prims.iter().map(|prim| shapes[*prim as usize].bounds()).collect();
-        let bounds = boxes.iter().copied().reduce(|a, b| a.union(&b)).map(|all| [all.min, all.max]);
-        let mut leaves = Leaves { shapes, widening: 0.0, leaves: vec![], packs: vec![], rounds: vec![] };
+    /// Builds the hierarchy over surfaces; planar ones must have an area.
+    pub(crate) fn new(surfaces: Vec<Surface>) -> Self {
+        let bounds = bounds(surfaces.iter().map(|surface| &surface.shape));
+        let mut leaves = SurfaceLeaves { widening: 0.0, leaves: None, packs: vec![], rounds: vec![] };
         if let Some([low, high]) = bounds {
             let largest = low.abs().max_element().max(high.abs().max_element());
             leaves.widening = MIN_WIDENING * f64::from(largest);
         }
-        let tree = Tree::new(&boxes, 4, |found| leaves.add(found.iter().map(|i| prims[*i as usize])));
-        let Leaves { mut leaves, mut packs, rounds, .. } = leaves;
         // Leaves are looked up only if there are round surfaces
-        if rounds.is_empty() {
-            leaves = vec![];
+        if !surfaces.iter().all(|surface| matches!(surface.shape, Shape::Planar { .. })) {
+            leaves.leaves = Some(vec![]);
         }
+        let tree = Tree::new(surfaces, 4, &mut leaves);
+        let SurfaceLeaves { leaves, mut packs, rounds, .. } = leaves;
         packs.shrink_to_fit();
-        Self { tree, leaves, packs, rounds, bounds }
+        Self { tree, leaves: leaves.unwrap_or_default(), packs, rounds, bounds }
     }
 }
 
-/// The leaves of a hierarchy that is being built: subtrees that fit into one pack, which costs no more than a
-/// node.
-struct Leaves<'a> {
-    shapes: &'a [Shape],
+impl Bounded for Surface {
+    fn bounds(&self) -> Aabb {
+        self.shape.bounds()
+    }
+}
+
+/// The leaves of a hierarchy that is being built.
+struct SurfaceLeaves {
     /// The least by which edges are widened, in scene units.
     widening: f64,
-    leaves: Vec<Leaf>,
+    /// None if each leaf is the pack of the same number.
+    leaves: Option<Vec<Leaf>>,
     packs: Vec<Pack>,
     rounds: Vec<Round>,
 }
 
-impl Leaves<'_> {
-    /// Adds a leaf, and returns its number.
-    fn add(&mut self, prims: impl Iterator<Item = u32>) -> u32 {
+impl Leaves<Surface> for SurfaceLeaves {
+    fn none(&self) -> Self {
+        let leaves = self.leaves.as_ref().map(|_| vec![]);
+        Self { widening: self.widening, leaves, packs: vec![], rounds: vec![] }
+    }
+
+    fn add(&mut self, surfaces: &[Surface]) -> u32 {
         let mut leaf = Leaf { pack: NO_PACK, first_round: self.rounds.len() as u32, rounds: 0 };
         let mut pack = Pack::default();
         let mut lane = 0;
-        for prim in prims {
-            let shape = &self.shapes[prim as usize];
-            if let Shape::Planar { corner, e1, e2, whole } = *shape {
+        for &Surface { shape, prim } in surfaces {
+            if let Shape::Planar { corner, e1, e2, whole } = shape {
                 let (corner, [e1, e2]) = widened(corner, e1, e2, whole, self.widening);
                 pack.set(lane, corner, dual(e1, e2), whole, prim);
                 lane += 1;
             } else {
-                self.rounds.push(Round::new(shape, prim));
+                self.rounds.push(Round::new(&shape, prim));
                 leaf.rounds += 1;
             }
         }
@@ -65,8 +73,23 @@ impl Leaves<'_> {
             leaf.pack = self.packs.len() as u32;
             self.packs.push(pack);
         }
-        self.leaves.push(leaf);
-        (self.leaves.len() - 1) as u32
+        let Some(leaves) = &mut self.leaves else { return leaf.pack };
+        leaves.push(leaf);
+        leaves.len() as u32 - 1
+    }
+
+    fn append(&mut self, others: Self) -> u32 {
+        let [packs, rounds] = [self.packs.len(), self.rounds.len()].map(|count| count as u32);
+        self.packs.extend(others.packs);
+        self.rounds.extend(others.rounds);
+        let (Some(leaves), Some(others)) = (&mut self.leaves, others.leaves) else { return packs };
+        let first = leaves.len() as u32;
+        leaves.extend(others.into_iter().map(|leaf| Leaf {
+            pack: if leaf.pack == NO_PACK { NO_PACK } else { leaf.pack + packs },
+            first_round: leaf.first_round + rounds,
+            ..leaf
+        }));
+        first
     }
 }
 

@@ -1,13 +1,14 @@
 //! The hierarchy of a scene: its own surfaces, and instances of objects.
 
+use super::aabb::Aabb;
 use super::bvh::{Bvh, HitShape, LocalHit};
+use super::cut::Bounded;
 use super::leaf::Spot;
 use super::node::{Node, WideRay};
-use super::tree::{Tree, Waiting};
+use super::tree::{Leaves, Tree, Waiting};
 use crate::geometry::NO;
 use crate::math::{Ray, Vec3};
 use glam::{DAffine3, Mat3};
-use obvhs::aabb::Aabb;
 
 /// By how much the box of an instance is widened, relative to its coordinates: a few roundings.
 const WIDENING: f32 = 1e-6;
@@ -46,6 +47,29 @@ pub(crate) struct Hierarchy {
     /// Over the boxes of the instances.
     tree: Tree,
     bounds: [Vec3; 2],
+}
+
+/// The leaves over instances: each is one of them, and has its number.
+struct InstanceLeaves;
+
+impl Leaves<(Aabb, u32)> for InstanceLeaves {
+    fn none(&self) -> Self {
+        Self
+    }
+
+    fn add(&mut self, instances: &[(Aabb, u32)]) -> u32 {
+        instances[0].1
+    }
+
+    fn append(&mut self, _: Self) -> u32 {
+        0
+    }
+}
+
+impl Bounded for (Aabb, u32) {
+    fn bounds(&self) -> Aabb {
+        self.0
+    }
 }
 
 /// An object in its place in the world.
@@ -150,7 +174,8 @@ impl Hierarchy {
                 Aabb::new(middle - reach, middle + reach)
             })
             .collect();
-        let tree = Tree::new(&boxes, 1, |leaf| leaf[0]);
+        let numbered = boxes.iter().zip(0..).map(|(bounds, index)| (*bounds, index)).collect();
+        let tree = Tree::new(numbered, 1, &mut InstanceLeaves);
         let own_box = own.bounds.map(|[low, high]| Aabb::new(low, high));
         let all = boxes.into_iter().chain(own_box).reduce(|a, b| a.union(&b));
         let bounds = all.map_or([Vec3::NEG_ONE, Vec3::ONE], |all| [all.min, all.max]);

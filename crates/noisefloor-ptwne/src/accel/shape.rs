@@ -1,7 +1,7 @@
 //! The shape of a surface.
 
+use super::aabb::Aabb;
 use crate::math::Vec3;
-use obvhs::aabb::Aabb;
 
 /// The shape of a surface, without its material.
 #[derive(Clone, Copy, Debug)]
@@ -15,12 +15,20 @@ pub(crate) enum Shape {
     Disk { centre: glam::Vec3, e1: glam::Vec3, e2: glam::Vec3 },
 }
 
+/// A surface, by its index.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    pub(crate) shape: Shape,
+    pub(crate) prim: u32,
+}
+
 impl Shape {
     pub(super) fn bounds(&self) -> Aabb {
         match *self {
             Shape::Planar { corner, e1, e2, whole } => {
-                let last = if whole { corner + e1 + e2 } else { corner };
-                Aabb::from_points(&[corner, corner + e1, corner + e2, last].map(Vec3::from))
+                let [corner, a, b] = [corner, corner + e1, corner + e2].map(Vec3::from);
+                let last = if whole { a + Vec3::from(e2) } else { corner };
+                Aabb::new(corner.min(a).min(b).min(last), corner.max(a).max(b).max(last))
             }
             Shape::Sphere { centre, radius } => Aabb::new((centre - radius).into(), (centre + radius).into()),
             Shape::Disk { centre, e1, e2 } => {

@@ -3,7 +3,7 @@
 //! `NOISEFLOOR_RAYS=FOLDER/NAME cargo test --release -p noisefloor-ptwne --lib speed -- --ignored --nocapture`
 //! reads what docs/benchmarks/rays has written for a scene.
 
-use super::{Bvh, Hierarchy, Shape};
+use super::{Bvh, Hierarchy, Shape, Surface};
 use crate::math::Ray;
 use std::time::{Duration, Instant};
 
@@ -58,7 +58,7 @@ fn rate<Answer>(rays: &[Told], answers: &mut [Answer], mut trace: impl FnMut(&To
 #[ignore = "a benchmark, for a scene that NOISEFLOOR_RAYS names"]
 fn speed() {
     let stem = std::env::var("NOISEFLOOR_RAYS").expect("NOISEFLOOR_RAYS names a scene");
-    let (shapes, all) = {
+    let surfaces: Vec<Surface> = {
         let corners = floats(&stem, "triangles");
         let shape = |c: &[f32; 9]| {
             let [a, b, c] = [0, 3, 6].map(|i| glam::Vec3::new(c[i], c[i + 1], c[i + 2]));
@@ -70,21 +70,21 @@ fn speed() {
             0.5 * e1.as_dvec3().cross(e2.as_dvec3()).length() >= f64::from(crate::builder::MIN_AREA)
         };
         shapes.retain(has_area);
-        let all: Vec<u32> = (0..shapes.len() as u32).collect();
-        (shapes, all)
+        shapes.into_iter().zip(0..).map(|(shape, prim)| Surface { shape, prim }).collect()
     };
     // From here on, only what building takes
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     let (before, start) = (peak(), Instant::now());
-    let bvh = Bvh::new(&shapes, &all);
-    let (build, building) = (start.elapsed().as_secs_f64(), peak() - before);
-    let per = |bytes: usize| bytes as f64 / shapes.len() as f64;
+    let count = surfaces.len();
+    let bvh = Bvh::new(surfaces);
+    let (build, building) = (start.elapsed().as_secs_f64(), peak().saturating_sub(before));
+    let per = |bytes: usize| bytes as f64 / count as f64;
     println!(
-        "{stem}: {} triangles, built in {build:.2} s; bytes a triangle: {:.0}, while building {:.0} more than {:.0}",
-        shapes.len(),
+        "{stem}: {} triangles, built in {build:.2} s; bytes a triangle: {:.0}, while building {:.0} more than {}",
+        count,
         per(bvh.bytes()),
         per(building),
-        per(size_of_val(shapes.as_slice()) + size_of_val(all.as_slice())),
+        size_of::<Surface>(),
     );
 
     let scene = Hierarchy::new(bvh, vec![], vec![]);

@@ -28,7 +28,7 @@ impl Bvh {
     }
 
     #[inline(always)]
-    fn nearest<const ROUNDS: bool>(
+    pub(super) fn nearest<const ROUNDS: bool>(
         &self,
         ray: &Ray,
         t_max: f32,
@@ -106,7 +106,7 @@ impl Bvh {
     }
 
     #[inline(always)]
-    fn any<const ROUNDS: bool, const OPACITY: bool>(
+    pub(super) fn any<const ROUNDS: bool, const OPACITY: bool>(
         &self,
         ray: &Ray,
         t_max: f32,

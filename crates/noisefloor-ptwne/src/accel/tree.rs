@@ -1,12 +1,9 @@
 //! A hierarchy of boxes: how it is built, and how a ray walks it. What its leaves hold is somebody else's.
 
-use super::median;
+use super::cut::{Bounded, Part};
 use super::node::{LEAF, Lanes, Node, WIDTH, WideRay};
 use crate::math::Vec3;
-use crate::rng;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use rayon::prelude::*;
 
 /// Nodes still to visit, with the distance at which each begins.
 #[derive(Clone, Debug)]
@@ -19,14 +16,20 @@ impl Waiting {
     }
 }
 
-/// A ray meets so many boxes of a subtree at most, in the mean, if the tree is to be a good one: to find one
-/// takes time in proportion to that number. Meshes have about 2, forests 20, and n equal boxes have n.
-const CROWDED: f32 = 500.0;
-/// Most boxes that are looked at to tell.
-const SAMPLE: usize = 1 << 16;
-/// Share of the nodes that are reinserted. More, and a second run, take most of the time of loading for little:
-/// docs/benchmarks/bvh.md
-const REINSERTED: f32 = 0.05;
+/// A large tree is built as so many branches, at most of this many surfaces. Their number does not depend on threads,
+/// and neither does the tree.
+const BRANCHES: usize = 64;
+const MIN_BRANCH: usize = 1 << 12;
+
+/// What the leaves of a tree hold.
+pub(super) trait Leaves<T>: Send + Sync + Sized {
+    /// None yet, of the same kind.
+    fn none(&self) -> Self;
+    /// Adds a leaf, and returns its number.
+    fn add(&mut self, surfaces: &[T]) -> u32;
+    /// Adds others after its own, and returns by how much their numbers grow.
+    fn append(&mut self, others: Self) -> u32;
+}
 
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
@@ -36,52 +39,51 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// Builds the hierarchy over `boxes`. `leaf` is told which of them a leaf has, at most `most`, and numbers
-    /// it.
-    pub(super) fn new(boxes: &[Aabb], most: usize, mut leaf: impl FnMut(&[u32]) -> u32) -> Self {
+    /// Builds the hierarchy over `surfaces`, of which a leaf has at most `most`.
+    pub(super) fn new<T: Bounded>(mut surfaces: Vec<T>, most: usize, leaves: &mut impl Leaves<T>) -> Self {
         let mut tree = Self { nodes: vec![Node::EMPTY], waiting: WIDTH };
-        if !boxes.is_empty() {
-            tree.waiting = (WIDTH - 1) * tree.collapse(&binary(boxes), most, &mut leaf) + WIDTH;
-            tree.nodes.shrink_to_fit();
+        if surfaces.is_empty() {
+            return tree;
         }
-        tree
-    }
+        // The upper levels
+        let small = (surfaces.len() / BRANCHES).max(MIN_BRANCH);
+        let mut branches = vec![];
+        let all = Part::all(&surfaces);
+        let mut depth = grow(&mut tree.nodes, &mut surfaces, all, [most, small], |_, part, place| {
+            branches.push((part, place));
+            LEAF
+        });
+        branches.sort_unstable_by_key(|(part, _)| part.range.start);
 
-    /// Collapses the binary tree: each wide node opens the largest of its inner children until it has eight.
-    /// Subtrees of at most `most` boxes become leaves. Returns the depth.
-    fn collapse(&mut self, tree: &Bvh2, most: usize, leaf: &mut impl FnMut(&[u32]) -> u32) -> usize {
-        let mut depth = 1;
-        let mut todo = vec![(0usize, vec![0usize], 1usize)];
-        while let Some((at, mut children, level)) = todo.pop() {
-            depth = level.max(depth);
-            while children.len() < WIDTH {
-                let large = |i: &usize| at_most(most, tree, children[*i]).is_none();
-                let area = |i: &usize| tree.nodes[children[*i]].aabb().half_area();
-                let Some(open) = (0..children.len()).filter(large).max_by(|a, b| area(a).total_cmp(&area(b)))
-                else {
-                    break;
-                };
-                let first = tree.nodes[children.swap_remove(open)].first_index as usize;
-                children.extend([first, first + 1]);
+        // Branches in parallel, the last ones first, so that memory of surfaces can go to nodes
+        while !branches.is_empty() {
+            let some = branches.len().saturating_sub(2 * rayon::current_num_threads());
+            let some = branches.split_off(some);
+            let first = some[0].0.range.start;
+            let mut rest = &mut surfaces[first..];
+            let mut jobs = vec![];
+            for (part, place) in some {
+                let (own, more) = rest.split_at_mut(part.range.len());
+                jobs.push((own, part.from(0), place, leaves.none()));
+                rest = more;
             }
-            for (lane, &child) in children.iter().enumerate() {
-                let node = &tree.nodes[child];
-                for axis in 0..3 {
-                    self.nodes[at].bounds[axis][0].set(lane, node.aabb().min[axis]);
-                    self.nodes[at].bounds[axis][1].set(lane, node.aabb().max[axis]);
-                }
-                self.nodes[at].child[lane] = if let Some(prims) = at_most(most, tree, child) {
-                    LEAF | leaf(prims.as_slice())
-                } else {
-                    let first = node.first_index as usize;
-                    let index = self.nodes.len();
-                    self.nodes.push(Node::EMPTY);
-                    todo.push((index, vec![first, first + 1], level + 1));
-                    index as u32
-                };
+            let grown: Vec<_> = jobs
+                .into_par_iter()
+                .map(|(own, part, place, leaves)| (Branch::new(own, part, most, leaves), place))
+                .collect();
+            for (branch, [node, lane, level]) in grown.into_iter().rev() {
+                let (nodes, leaf) = (tree.nodes.len() as u32, leaves.append(branch.leaves));
+                let moved = |child: u32| child + if child & LEAF == 0 { nodes } else { leaf };
+                tree.nodes[node].child[lane] = moved(branch.root);
+                tree.nodes.extend(branch.nodes.into_iter().map(|n| Node { child: n.child.map(moved), ..n }));
+                depth = depth.max(level + branch.depth);
             }
+            surfaces.truncate(first);
+            surfaces.shrink_to_fit();
         }
-        depth
+        tree.waiting = (WIDTH - 1) * depth + WIDTH;
+        tree.nodes.shrink_to_fit();
+        tree
     }
 
     /// Visits the leaves that begin before `t_max`, nearest first as far as boxes tell. `visit` is given the
@@ -216,76 +218,70 @@ impl Tree {
     }
 }
 
-/// A binary tree over boxes, of which there is at least one.
-fn binary(boxes: &[Aabb]) -> Bvh2 {
-    if is_crowded(boxes) {
-        return median::tree(boxes);
-    }
-    let indices = (0..boxes.len() as u32).collect();
-    // What the library calls a medium build, for leaves of one box
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-        PlocSearchDistance::Medium,
-        boxes,
-        indices,
-        SortPrecision::U64,
-        3,
-    );
-    // It makes trees deeper, those of fans by a tenth, and panics where one is deeper than twice this
-    tree.max_depth *= 8;
-    ReinsertionOptimizer::default().run(&mut tree, REINSERTED, None);
-    tree
+/// A subtree, with nodes and leaves of its own.
+struct Branch<L> {
+    nodes: Vec<Node>,
+    leaves: L,
+    root: u32,
+    /// Levels of nodes.
+    depth: usize,
 }
 
-/// Whether too many boxes overlap, judged by a sample of them: in a sample of one in n, a ray meets an n-th of
-/// the boxes of a crowd. Crowds of less than a few n boxes are not found, and are too small to matter.
-pub(super) fn is_crowded(boxes: &[Aabb]) -> bool {
-    let step = boxes.len().div_ceil(SAMPLE);
-    let limit = (CROWDED / step as f32).max(8.0);
-    if step == 1 {
-        return median::crowding(&median::tree(boxes)) > limit;
-    }
-    // One of each `step`, at random, so that no order of a file can hide a crowd
-    let sample = boxes.chunks(step).enumerate();
-    let sample: Vec<Aabb> =
-        sample.map(|(i, part)| part[(rng::hash(0, i as u32) * part.len() as f32) as usize]).collect();
-    median::crowding(&median::tree(&sample)) > limit
-}
-
-/// Up to four boxes, by index.
-#[derive(Clone, Copy, Default)]
-struct Few {
-    boxes: [u32; 4],
-    len: usize,
-}
-
-impl Few {
-    fn as_slice(&self) -> &[u32] {
-        &self.boxes[..self.len]
-    }
-}
-
-/// The boxes below a node, if there are at most `most` ≤ 4.
-fn at_most(most: usize, tree: &Bvh2, root: usize) -> Option<Few> {
-    let mut found = Few::default();
-    gather(most, tree, root, &mut found).then_some(found)
-}
-
-/// Adds the boxes below a node to `found`. Returns whether there are at most `most` in all.
-fn gather(most: usize, tree: &Bvh2, root: usize, found: &mut Few) -> bool {
-    let node = &tree.nodes[root];
-    let first = node.first_index as usize;
-    if !node.is_leaf() {
-        // Each child has one box at least
-        return found.len + 2 <= most
-            && gather(most - 1, tree, first, found)
-            && gather(most, tree, first + 1, found);
-    }
-    for index in &tree.primitive_indices[first..first + node.prim_count as usize] {
-        if found.len >= most {
-            return false;
+impl<L> Branch<L> {
+    fn new<T: Bounded>(surfaces: &mut [T], part: Part, most: usize, mut leaves: L) -> Self
+    where
+        L: Leaves<T>,
+    {
+        if surfaces.len() <= most {
+            let root = LEAF | leaves.add(surfaces);
+            return Self { nodes: vec![], leaves, root, depth: 0 };
         }
-        found.boxes[found.len] = *index;
-        found.len += 1;
+        let mut nodes = vec![Node::EMPTY];
+        let depth = grow(&mut nodes, surfaces, part, [most; 2], |surfaces, part, _| {
+            LEAF | leaves.add(&surfaces[part.range])
+        });
+        Self { nodes, leaves, root: 0, depth }
     }
-    true
+}
+
+/// Grows a tree from its first node down to parts of at most `small` surfaces; `end` says which child a part becomes,
+/// and is told the node, the lane and the number of levels above it. Each node opens the largest of its children that
+/// have more than `most` surfaces until there are eight. Returns the number of levels.
+fn grow<T: Bounded>(
+    nodes: &mut Vec<Node>,
+    surfaces: &mut [T],
+    all: Part,
+    [most, small]: [usize; 2],
+    mut end: impl FnMut(&mut [T], Part, [usize; 3]) -> u32,
+) -> usize {
+    let mut depth = 0;
+    let mut todo = vec![(0usize, all, 1usize)];
+    let mut children = vec![];
+    while let Some((at, part, level)) = todo.pop() {
+        depth = level.max(depth);
+        children.clear();
+        children.push(part);
+        while children.len() < WIDTH {
+            let area = |i: &usize| children[*i].bounds.half_area();
+            let large = (0..children.len()).filter(|i| children[*i].range.len() > most);
+            let Some(open) = large.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+            let [low, high] = children[open].cut(surfaces, most);
+            children[open] = low;
+            children.insert(open + 1, high);
+        }
+        for (lane, child) in children.drain(..).enumerate() {
+            for axis in 0..3 {
+                nodes[at].bounds[axis][0].set(lane, child.bounds.min[axis]);
+                nodes[at].bounds[axis][1].set(lane, child.bounds.max[axis]);
+            }
+            nodes[at].child[lane] = if child.range.len() <= small {
+                end(surfaces, child, [at, lane, level])
+            } else {
+                nodes.push(Node::EMPTY);
+                todo.push((nodes.len() - 1, child, level + 1));
+                nodes.len() as u32 - 1
+            };
+        }
+    }
+    depth
 }

@@ -1,7 +1,7 @@
 //! The builder.
 
 use super::input::{Emission, MAX_INSTANCES, MAX_SURFACES, MIN_AREA, MaterialId, Mesh};
-use crate::accel::{self, Instance, Shape};
+use crate::accel::{self, Instance, Shape, Surface};
 use crate::bsdf::Coat;
 use crate::camera::{Camera, Optics};
 use crate::checks::{MAX_COORDINATE, check_radiance, check_range, position, room};
@@ -274,11 +274,11 @@ impl SceneBuilder {
                 vertices.tangents.extend(mesh.tangents);
             }
         }
-        let surfaces = self.parts.shapes.len() + mesh.indices.len();
+        let surfaces = self.parts.surfaces.len() + mesh.indices.len();
         if surfaces > MAX_SURFACES {
             return Err(SceneError::TooLarge { what: "surfaces", found: surfaces, limit: MAX_SURFACES });
         }
-        room(&mut self.parts.shapes, mesh.indices.len())?;
+        room(&mut self.parts.surfaces, mesh.indices.len())?;
         room(&mut self.parts.geometry.group_of, mesh.indices.len())?;
         if with_vertices {
             room(&mut self.parts.geometry.vertices.corners, mesh.indices.len())?;
@@ -341,7 +341,7 @@ impl SceneBuilder {
             }),
         });
         let light = if group_emission.is_some() { index(self.parts.lights.len())? } else { NO };
-        let first = index(self.parts.shapes.len())?;
+        let first = index(self.parts.surfaces.len())?;
         Ok((
             Group {
                 first,
@@ -362,10 +362,10 @@ impl SceneBuilder {
 
     /// Adds the group, if it has got any surfaces.
     fn close(&mut self, group: Group) {
-        if self.parts.shapes.len() > group.first as usize {
+        if self.parts.surfaces.len() > group.first as usize {
             let number = self.parts.geometry.groups.len() as u32;
             self.parts.geometry.groups.push(group);
-            self.parts.geometry.group_of.resize(self.parts.shapes.len(), number);
+            self.parts.geometry.group_of.resize(self.parts.surfaces.len(), number);
         }
     }
 
@@ -406,7 +406,7 @@ impl SceneBuilder {
             }
         }
         let parts = &mut self.parts;
-        let prim = parts.shapes.len();
+        let prim = parts.surfaces.len();
         if prim >= MAX_SURFACES {
             return Err(SceneError::TooLarge { what: "surfaces", found: prim + 1, limit: MAX_SURFACES });
         }
@@ -415,8 +415,8 @@ impl SceneBuilder {
             let light = Light::surface(&shape, radiance.into(), two_sided, prim as u32);
             parts.lights.push(Light { texture, ..light });
         }
-        room(&mut parts.shapes, 1)?;
-        parts.shapes.push(shape);
+        room(&mut parts.surfaces, 1)?;
+        parts.surfaces.push(Surface { shape, prim: prim as u32 });
         Ok(true)
     }
 }
@@ -523,7 +523,7 @@ impl SceneBuilder {
         if self.open_object.is_some() {
             return Err(SceneError::Object("an object in an object"));
         }
-        self.open_object = Some(self.parts.shapes.len() as u32);
+        self.open_object = Some(self.parts.surfaces.len() as u32);
         Ok(())
     }
 
@@ -533,15 +533,17 @@ impl SceneBuilder {
     /// [`SceneError::Object`] if none has begun.
     pub fn end_object(&mut self) -> Result<ObjectId, SceneError> {
         let first = self.open_object.take().ok_or(SceneError::Object("the end of no object"))?;
-        let surfaces = first..self.parts.shapes.len() as u32;
-        let shapes = &mut self.parts.shapes[first as usize..];
+        let surfaces = first..self.parts.surfaces.len() as u32;
+        let inside = &mut self.parts.surfaces[first as usize..];
         let mut object = Object { surfaces, bounds: [Vec3::ZERO; 2], origin: glam::Vec3::ZERO };
-        if let Some([low, high]) = accel::bounds(&*shapes) {
+        if let Some([low, high]) = accel::bounds(inside.iter().map(|surface| &surface.shape)) {
             // Around the origin, so that `f32` keeps its detail
             let centre = 0.5 * (low + high);
             if centre.abs().max_element() > 0.5 * (high - low).length() {
                 object.origin = centre.into();
-                shapes.iter_mut().for_each(|shape| *shape = shape.translated(-object.origin));
+                inside
+                    .iter_mut()
+                    .for_each(|surface| surface.shape = surface.shape.translated(-object.origin));
             }
             object.bounds = [low, high].map(|corner| corner - Vec3::from(object.origin));
         }
@@ -549,8 +551,8 @@ impl SceneBuilder {
         Ok(ObjectId(self.parts.objects.len() as u32 - 1))
     }
 
-    /// Shows an object once more, moved by a matrix whose rows are given, translation last. It costs a hundred
-    /// bytes, whatever is in the object. Fronts stay fronts where the matrix mirrors.
+    /// Shows an object once more, moved by a matrix whose rows are given, translation last. It costs two
+    /// hundred bytes, whatever is in the object. Fronts stay fronts where the matrix mirrors.
     ///
     /// # Errors
     /// [`SceneError::Singular`] if the matrix flattens the object, or is too near to one that does for `f32`;

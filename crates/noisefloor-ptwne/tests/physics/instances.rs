@@ -315,8 +315,8 @@ fn memory_is_shared() {
         scene.geometry_bytes()
     };
     let (one, thousand) = (bytes(1), bytes(1000));
-    // 88 bytes of matrices, and nodes of 112 bytes of which each has at least two children
-    assert!(thousand - one < 1000 * (88 + 112), "{one} {thousand}");
+    // 88 bytes of matrices, and nodes of 224 bytes of which each has at least two children
+    assert!(thousand - one < 1000 * (88 + 224), "{one} {thousand}");
     assert!(one > 128 * 50, "{one}");
 }
 
