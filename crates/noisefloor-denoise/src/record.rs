@@ -50,7 +50,7 @@ impl DenoisedRecord {
         let expected = if verdicts == 0 { 0 } else { tiles };
         let (lost, undenoised) = rest.split_at_checked(8 * expected)?;
         let flags = undenoised.len() == expected && undenoised.iter().all(|&flag| flag <= 1);
-        if !flags || !(seconds >= 0.0 && seconds.is_finite()) {
+        if !(flags && seconds >= 0.0 && seconds.is_finite()) {
             return None;
         }
         let jods_lost = lost.as_chunks().0.iter().map(|lost| f64::from_le_bytes(*lost)).collect();
