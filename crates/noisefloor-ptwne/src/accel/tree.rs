@@ -74,8 +74,8 @@ impl Tree {
             for (branch, [node, lane, level]) in grown.into_iter().rev() {
                 let (nodes, leaf) = (tree.nodes.len() as u32, leaves.append(branch.leaves));
                 let moved = |child: u32| child + if child & LEAF == 0 { nodes } else { leaf };
-                tree.nodes[node].child[lane] = moved(branch.root);
                 tree.nodes.extend(branch.nodes.into_iter().map(|n| Node { child: n.child.map(moved), ..n }));
+                tree.nodes[node].child[lane] = moved(branch.root);
                 depth = depth.max(level + branch.depth);
             }
             surfaces.truncate(first);
