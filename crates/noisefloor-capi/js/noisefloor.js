@@ -91,7 +91,7 @@ export const STRUCTS = {};
 STRUCTS.NfParams = struct(
   "uint32_t tile; uint32_t schedule; uint64_t step; uint64_t min_spp; uint64_t max_spp; " +
     "uint32_t consecutive; uint32_t tone_mapping; float key; float white; float exposure; " +
-    "double audience_slope; double audience_offset; char* viewing",
+    "double audience_slope; double audience_offset; char* viewing; NfTone* tone",
 );
 STRUCTS.NfTile = struct("size_t index; size_t x; size_t y; size_t width; size_t height");
 STRUCTS.NfRequest = struct("NfTile tile; uint64_t first; uint64_t spp; uint32_t sequence; uint64_t point");
