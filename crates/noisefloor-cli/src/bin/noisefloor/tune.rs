@@ -396,8 +396,11 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
         let pictures = if many { "the last pictures" } else { "the last two pictures" };
         say!("{}; {:.0} s, of which {pictures} took {last:.0} s", report.judged, report.seconds)?;
         if !report.regions.is_empty() {
-            let count = report.regions.len();
-            say!("only the {count} places that were worst with the coarsest setting were looked at again")?;
+            let places = match report.regions.len() {
+                1 => "the place that was".to_owned(),
+                count => format!("the {count} places that were"),
+            };
+            say!("only {places} worst with the coarsest setting had another look")?;
         }
     }
     Ok(())
