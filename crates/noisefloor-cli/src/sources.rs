@@ -10,7 +10,7 @@ use crate::say::note;
 use crate::spell::{JobPath, as_typed};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::{ProgressiveSource, Rgb, Schedule, stills::SampleOrigin};
+use noisefloor::{ProgressiveSource, Rgb, Schedule, Tile, stills::SampleOrigin};
 use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
@@ -128,13 +128,14 @@ pub trait Source: ProgressiveSource {
         None
     }
 
-    /// A whole picture of this seed as the renderer itself samples it, until its own noise threshold; `None` if it
-    /// has none.
+    /// A picture of this seed, or a part of it, as the renderer itself samples it, until its own noise threshold; `None`
+    /// if it has none.
     fn adaptive(
         &mut self,
         _threshold: f64,
         _most: Option<u64>,
         _seed: u32,
+        _part: Option<Tile>,
     ) -> anyhow::Result<Option<Vec<Rgb>>> {
         Ok(None)
     }

@@ -201,7 +201,24 @@ class Addon(unittest.TestCase):
     def test_the_picture_is_the_mean_of_all_samples(self):
         scene = room(closed=True)
         scene.noisefloor.max_samples, scene.noisefloor.people = 4096, 0.9
-        picture, parts = rendered(scene)
+        told, progress = [], frame.Frame.progress
+
+        def record(self):
+            share, left = progress(self)
+            told.append((len(self.thresholds), share, left))
+            return share, left
+
+        frame.Frame.progress = record
+        try:
+            picture, parts = rendered(scene)
+        finally:
+            frame.Frame.progress = progress
+        # Unknown before the first verdict, and then it goes on
+        self.assertEqual(told[:2], [(1, None, None)] * 2)
+        for (one, before, _), (other, share, left) in zip(told[2:], told[3:]):
+            self.assertTrue(one < other or before < share or share == 1, told)
+            self.assertTrue(0 < share <= 1 and left >= 0, told)
+        self.assertGreater(len(told), 3)
         wanted, count = mean(parts)
         # Sums of at most 4096 samples in some pictures, in float32
         numpy.testing.assert_allclose(picture, wanted, rtol=2e-6 * len(parts), atol=1e-6)

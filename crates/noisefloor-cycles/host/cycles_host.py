@@ -119,8 +119,8 @@ class Cycles:
                 answers[member] = (samples, self.np.ascontiguousarray(part, self.np.float32))
         return answers
 
-    def adaptive(self, threshold, samples, seed):
-        """The picture as Cycles renders it by the settings of the scene, until this noise threshold; not denoised. Its pixel
+    def adaptive(self, threshold, samples, seed, part):
+        """The picture, or a part of it, as Cycles renders it by the settings of the scene, until this noise threshold; not denoised. Its pixel
         filter is sampled, so that the noise of neighbours stays independent."""
         cycles, render = self.scene.cycles, self.scene.render
         names = [*self.own, "use_adaptive_sampling", "adaptive_threshold", "seed"]
@@ -135,8 +135,9 @@ class Cycles:
             if samples:
                 cycles.samples = samples
             size = render.resolution_x, render.resolution_y
-            aim(render, size, (0, 0, *size))
-            self.shape = (*size[::-1], 3)
+            region = tuple(part or (0, 0, *size))
+            aim(render, size, region)
+            self.shape = (*region[:1:-1], 3)
             return self.np.ascontiguousarray(self._render(), self.np.float32)
         finally:
             for name, value in before.items():

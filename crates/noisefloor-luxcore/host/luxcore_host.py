@@ -106,11 +106,13 @@ class LuxCore:
             return self._continue_chains(tiles)
         return self._in_blocks(tiles) if self.sobol else self._fresh_sessions(tiles)
 
-    def adaptive(self, threshold, samples, seed):
+    def adaptive(self, threshold, samples, seed, part):
         """The picture as LuxCore samples it where there is noise, until its halt condition: no pixel, as displayed, changes
         by more than the threshold between two looks. Not denoised."""
         if self.metropolis:
             return None
+        if part:
+            raise ValueError("LuxCore's sampling of a part is not that of the whole: it goes where the noise of all is")
         config = self.lux.Properties()
         config.Set(self.config)
         for key in FORCED:

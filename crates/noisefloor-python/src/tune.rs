@@ -5,7 +5,7 @@ use crate::errors::{CriterionError, ParameterError, PictureError, Raise, SizeErr
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
-use noisefloor::tune::{Ending, Excess, Knob, Next, PairError, PicturePair, Tuning, squares};
+use noisefloor::tune::{Ending, Excess, Knob, Next, PairError, PicturePair, Tuning, most_in_squares};
 use noisefloor::{Oracle, Params, Rgb, Tile};
 use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedExcess, DenoisedHalves};
 use numpy::PyArray2;
@@ -228,8 +228,7 @@ fn compare(
             PairError::Size(error) => error.raise(),
             other => CriterionError::new_err(other.to_string()),
         })?;
-        let worst = |tile: &Tile| tile.rows(size.0).flatten().map(|pixel| map[pixel]).fold(0.0, f32::max);
-        let squares = squares(size).into_iter().map(|tile| (tile, f64::from(worst(&tile)))).collect();
+        let squares = most_in_squares(size, &map);
         return Ok(PyExcess { excess, size, map, squares });
     };
     let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());

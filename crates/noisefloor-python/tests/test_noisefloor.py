@@ -869,6 +869,13 @@ class Settings(unittest.TestCase):
         ]
         self.assertGreater(ratios[0], 2 * ratios[1])
         half = nf.excess(*pair, params=params, denoised=tuple(blur(p, little) for p in pair), lost=0.6)
+        for found in (half, nf.excess(*pair, params=params)):
+            squares = found.squares()
+            self.assertAlmostEqual(max(ratio for *_, ratio in squares), found.ratio, places=5)
+            self.assertEqual({(width, height) for _, _, width, height, _ in squares}, {(64, 64)})
+            x, y = found.place
+            worst = max(squares, key=lambda square: square[-1])
+            self.assertTrue(worst[0] <= x < worst[0] + 64 and worst[1] <= y < worst[1] + 64, (found.place, worst))
         self.assertAlmostEqual(half.ratio, ratios[0] / 2)
 
     def test_ends_are_told_and_nonsense_is_refused(self):

@@ -11,7 +11,7 @@ A host script defines a class and hands it to `serve`:
         info = {...}                    # name, width, height, unit, repeats, warnings
         def sample(self, tiles): ...    # [(samples, array of height x width x 3 float32), ...], in the order of the tiles
         def first_hits(self, index, samples): ...   # optional: arrays of the albedo and the normals of the whole image
-        def adaptive(self, threshold, samples, seed): ...   # optional: the whole image, by the renderer's own sampling
+        def adaptive(self, threshold, samples, seed, part): ...   # optional: the image, or (x, y, width, height) of it, by the renderer's own sampling
 
     host.serve(Renderer)
 
@@ -164,11 +164,12 @@ def _answer(Host, renderer, request, data):
         width, height = renderer.info["width"], renderer.info["height"]
         return renderer, {"ok": True, "first_hits": True}, [_bytes(albedo, width, height), _bytes(normal, width, height)]
     if op == "adaptive":
-        render = getattr(renderer, "adaptive", lambda threshold, samples, seed: None)
-        image = render(request["threshold"], request["samples"], request["seed"])
+        render = getattr(renderer, "adaptive", lambda threshold, samples, seed, part: None)
+        image = render(request["threshold"], request["samples"], request["seed"], request["part"])
         if image is None:
             return renderer, {"ok": True, "adaptive": False}, []
-        return renderer, {"ok": True, "adaptive": True}, [_bytes(image, renderer.info["width"], renderer.info["height"])]
+        size = request["part"][2:] if request["part"] else (renderer.info["width"], renderer.info["height"])
+        return renderer, {"ok": True, "adaptive": True}, [_bytes(image, *size)]
     if op == "filter":
         width, height, names, count = (request[key] for key in ["width", "height", "pictures", "frames"])
         size = 12 * width * height

@@ -38,7 +38,7 @@
 //! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `late` (optional), `warnings` |
 //! | `sample` | `samples`; payload: the means of the new samples of each tile that has any |
 //! | `first_hits` | `first_hits` (true or false); payload: albedo and normals of the whole image if true |
-//! | `adaptive` | `adaptive` (true or false); payload: the whole image if true |
+//! | `adaptive` | `adaptive` (true or false); payload: the image, or its part, if true |
 //! | `filter` | payload: one picture |
 //! | `quit` | the process ends after its reply |
 //!

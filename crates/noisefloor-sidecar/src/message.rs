@@ -109,13 +109,14 @@ pub(crate) struct FirstHitsMade {
     pub(crate) first_hits: bool,
 }
 
-/// A whole picture, sampled by the renderer's own adaptive sampling.
+/// A whole picture, or a part of it (x, y, width, height), sampled by the renderer's own adaptive sampling.
 #[derive(Serialize)]
 pub(crate) struct Adaptive {
     pub(crate) op: &'static str,
     pub(crate) threshold: f64,
     pub(crate) samples: Option<u64>,
     pub(crate) seed: u32,
+    pub(crate) part: Option<[usize; 4]>,
 }
 
 /// The picture is its payload, if the renderer has such a threshold.

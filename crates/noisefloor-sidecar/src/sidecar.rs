@@ -8,7 +8,7 @@ use crate::process::Process;
 use crate::renderer::{HostOptions, Job, Renderer};
 use crate::setup;
 use noisefloor::{
-    Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo,
+    Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo, Tile,
     source::{FirstHits, SourceIdentity},
     watch::LightCheck,
 };
@@ -89,8 +89,8 @@ impl Sidecar {
         self.process.as_ref().map(Process::id)
     }
 
-    /// A whole picture as the renderer itself samples it, by its own settings, until its own noise threshold: linear
-    /// radiance, row-major; `None` if this renderer has no such threshold. `samples` is the most per pixel; without
+    /// A picture as the renderer itself samples it, by its own settings, until its own noise threshold: linear radiance,
+    /// row-major; `None` if this renderer has no such threshold. A `part` of it is as in the whole, or refused. `samples` is the most per pixel; without
     /// it, what the scene says. Pictures of two seeds below 2³¹ are independent.
     ///
     /// # Errors
@@ -100,9 +100,11 @@ impl Sidecar {
         threshold: f64,
         samples: Option<u64>,
         seed: u32,
+        part: Option<Tile>,
     ) -> Result<Option<Vec<Rgb>>, SidecarError> {
-        let pixels = self.info.width * self.info.height;
-        let request = Adaptive { op: "adaptive", threshold, samples, seed };
+        let pixels = part.map_or(self.info.width * self.info.height, |part| part.pixels());
+        let part = part.map(|part| [part.x, part.y, part.width, part.height]);
+        let request = Adaptive { op: "adaptive", threshold, samples, seed, part };
         let read = |Reply { header: Adapted { adaptive }, payload }: Reply<Adapted>| {
             exactly(&payload, if adaptive { pixels } else { 0 })?;
             Ok(adaptive.then(|| rgb(&payload).collect::<Vec<Rgb>>()))

@@ -3,6 +3,7 @@
 use crate::error::CommandError;
 use crate::picture_run::PictureRun;
 use crate::template::Template;
+use noisefloor::Tile;
 use noisefloor_image::LinearImage;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -12,7 +13,8 @@ use std::time::Duration;
 ///
 /// The command is a template, split into words as a POSIX shell does; no shell is run. `{threshold}`, `{seed}` (a
 /// number in 0…2³¹−1) and `{out}` (a path without extension, in an empty folder) are required; `{spp}`, the most
-/// samples per pixel, `{scene}`, `{width}` and `{height}` are optional.
+/// samples per pixel, `{scene}`, `{width}` and `{height}` are optional. So are `{x0}`, `{y0}`, `{x1}` and `{y1}`, the part
+/// that is wanted, the last two exclusive; the picture may be the part or the whole.
 #[derive(Debug)]
 pub struct ThresholdCommand {
     template: Template,
@@ -33,21 +35,32 @@ impl ThresholdCommand {
         size: Option<(usize, usize)>,
         timeout: Duration,
     ) -> Result<Self, CommandError> {
-        let known = ["scene", "threshold", "spp", "seed", "width", "height", "out"];
-        let parsed = Template::parse(template, &known, &["threshold", "seed", "out"])?;
-        if size.is_none() && (parsed.has("width") || parsed.has("height")) {
+        let part = ["x0", "y0", "x1", "y1"];
+        let known = [&["scene", "threshold", "spp", "seed", "width", "height", "out"][..], &part].concat();
+        let required: &[&str] = &["threshold", "seed", "out", "x0", "y0", "x1", "y1"];
+        let parts = Template::parse(template, &known, &[])?.has("x0");
+        let parsed = Template::parse(template, &known, if parts { required } else { &required[..3] })?;
+        if size.is_none() && (parts || parsed.has("width") || parsed.has("height")) {
             return Err(CommandError::Size("the command needs it".to_owned()));
         }
         Ok(Self { template: parsed, scene, size, timeout })
     }
 
-    /// Renders until the threshold, with at most so many samples per pixel.
+    /// Renders until the threshold, with at most so many samples per pixel; a part of the picture, if the template has
+    /// `{x0}`.
     ///
     /// # Errors
-    /// [`CommandError`] if the program fails, or writes no picture or one that is not finite.
-    pub fn render(&self, threshold: f64, most: u64, seed: u32) -> Result<LinearImage, CommandError> {
+    /// [`CommandError`] if the program fails, or writes no picture, one that is not finite, or one of neither size.
+    pub fn render(
+        &self,
+        threshold: f64,
+        most: u64,
+        seed: u32,
+        part: Option<Tile>,
+    ) -> Result<LinearImage, CommandError> {
         let run = PictureRun::new()?;
         let (out, (width, height)) = (run.out(), self.size.unwrap_or_default());
+        let wanted = part.unwrap_or(Tile { index: 0, x: 0, y: 0, width, height });
         let words = self.template.fill(|name| match name {
             "scene" => self.scene.clone().unwrap_or_default().into_os_string(),
             "threshold" => OsString::from(threshold.to_string()),
@@ -55,11 +68,26 @@ impl ThresholdCommand {
             "seed" => OsString::from(seed.to_string()),
             "width" => OsString::from(width.to_string()),
             "height" => OsString::from(height.to_string()),
+            "x0" => OsString::from(wanted.x.to_string()),
+            "y0" => OsString::from(wanted.y.to_string()),
+            "x1" => OsString::from((wanted.x + wanted.width).to_string()),
+            "y1" => OsString::from((wanted.y + wanted.height).to_string()),
             _ => out.clone().into_os_string(),
         });
         let (made, command) = run.finish(&words, self.timeout)?;
         if !made.pixels.iter().flatten().all(|c| c.is_finite()) {
             return Err(CommandError::NotFinite { command });
+        }
+        let Some(part) = part else { return Ok(made) };
+        if (made.width, made.height) == (width, height) {
+            let pixels = part.rows(width).flatten().map(|pixel| made.pixels[pixel]).collect();
+            return Ok(LinearImage { width: part.width, height: part.height, pixels });
+        }
+        if (made.width, made.height) != (part.width, part.height) {
+            let (got, wanted) = ((made.width, made.height), (part.width, part.height));
+            return Err(CommandError::Size(format!(
+                "the program wrote {got:?} pixels instead of {wanted:?}"
+            )));
         }
         Ok(made)
     }

@@ -192,6 +192,12 @@ pub fn squares((width, height): (usize, usize)) -> Vec<Tile> {
     rows.enumerate().map(|(index, (x, y))| Tile { index, ..square(x, y) }).collect()
 }
 
+/// The most that a map, row-major, has in each of these squares.
+pub fn most_in_squares(size: (usize, usize), map: &[f32]) -> Vec<(Tile, f64)> {
+    let most = |tile: &Tile| tile.rows(size.0).flatten().map(|pixel| map[pixel]).fold(0.0, f32::max);
+    squares(size).into_iter().map(|tile| (tile, f64::from(most(&tile)))).collect()
+}
+
 /// Two pictures of one view, rendered with the same setting and different seeds, and their mean: what is
 /// shown in the end, and what is judged.
 #[derive(Clone, Debug, PartialEq)]

@@ -165,7 +165,7 @@ fn adapts(mut source: Sidecar, repeats: bool) {
     };
     let sample = |source: &mut Sidecar| source.sample(&[Request::new(whole, 0, 64)]).unwrap().remove(0).mean;
     let before = sample(&mut source);
-    let mut adaptive = |threshold, seed| source.adaptive(threshold, Some(4096), seed).unwrap().unwrap();
+    let mut adaptive = |threshold, seed| source.adaptive(threshold, Some(4096), seed, None).unwrap().unwrap();
     let [coarse, fine] = [0.4, 0.04].map(|threshold| [1, 2].map(|seed| adaptive(threshold, seed)));
     assert!(apart(&coarse[0], &coarse[1]) > 0.0);
     let (much, little) = (apart(&coarse[0], &coarse[1]), apart(&fine[0], &fine[1]));
@@ -181,6 +181,15 @@ fn adapts(mut source: Sidecar, repeats: bool) {
 fn cycles_samples_by_its_own_threshold() {
     if usable(&noisefloor_cycles::RENDERER) {
         adapts(cycles(64, 64).unwrap(), true);
+        // A part is as in the whole, but for where Cycles looks at neighbours before it stops
+        let mut source = cycles(64, 64).unwrap();
+        let mut adaptive = |part| source.adaptive(0.1, Some(256), 3, part).unwrap().unwrap();
+        let part = Tile { index: 0, x: 8, y: 24, width: 40, height: 32 };
+        let (whole, cut) = (adaptive(None), adaptive(Some(part)));
+        let whole: Vec<Rgb> = part.rows(64).flatten().map(|pixel| whole[pixel]).collect();
+        let near = |(a, b): &(&Rgb, &Rgb)| (0..3).all(|c| (a[c] - b[c]).abs() <= 1e-4 * a[c].abs());
+        let same = whole.iter().zip(&cut).filter(near).count();
+        assert!(cut.len() == 1280 && same > 1000, "{same} of {} pixels", cut.len());
     }
 }
 
@@ -188,6 +197,10 @@ fn cycles_samples_by_its_own_threshold() {
 fn luxcore_samples_by_its_own_threshold() {
     if usable(&noisefloor_luxcore::RENDERER) {
         adapts(luxcore(Engine::Path, Sampler::Sobol, 64, 64).unwrap(), false);
+        let part = Tile { index: 0, x: 8, y: 24, width: 40, height: 32 };
+        let mut source = luxcore(Engine::Path, Sampler::Sobol, 64, 64).unwrap();
+        let error = source.adaptive(0.1, Some(64), 3, Some(part)).unwrap_err();
+        assert!(error.to_string().contains("a part"), "{error}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Opened, Resources, Source, SourceJob, stem};
 use anyhow::Context;
-use noisefloor::{Rgb, Schedule};
+use noisefloor::{Rgb, Schedule, Tile};
 use noisefloor_luxcore::{Engine, Sampler};
 use noisefloor_sidecar::{CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError};
 use std::fmt;
@@ -18,6 +18,8 @@ pub struct Adapter {
     pub step: u64,
     /// Whether it has a noise threshold of its own, and samples where the noise is above it.
     pub adapts: bool,
+    /// Whether it renders a part of such a picture as it is in the whole.
+    pub crops: bool,
     /// What keeps it from being all it could be here, and what mends that.
     pub notes: fn() -> Vec<String>,
 }
@@ -30,6 +32,7 @@ pub const ADAPTERS: &[Adapter] = &[
         open: noisefloor_mitsuba::open,
         step: Schedule::STEP,
         adapts: false,
+        crops: false,
         notes: noisefloor_mitsuba::notes,
     },
     luxcore("luxcore", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Random)),
@@ -41,6 +44,7 @@ pub const ADAPTERS: &[Adapter] = &[
     // A chain has no pixels of its own
     Adapter {
         adapts: false,
+        crops: false,
         ..luxcore("luxcore-metropolis", |job| {
             noisefloor_luxcore::open(job, Engine::Path, Sampler::Metropolis)
         })
@@ -53,13 +57,14 @@ pub const ADAPTERS: &[Adapter] = &[
         // Each call costs it a start
         step: 32,
         adapts: true,
+        crops: true,
         notes: Vec::new,
     },
 ];
 
 const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarError>) -> Adapter {
     let (renderer, step) = (&noisefloor_luxcore::RENDERER, Schedule::STEP);
-    Adapter { name, renderer, open, step, adapts: true, notes: Vec::new }
+    Adapter { name, renderer, open, step, adapts: true, crops: false, notes: Vec::new }
 }
 
 /// An adapter by its name: its functions have other addresses in every run.
@@ -92,8 +97,14 @@ impl FromStr for &'static Adapter {
 }
 
 impl Source for Sidecar {
-    fn adaptive(&mut self, threshold: f64, most: Option<u64>, seed: u32) -> anyhow::Result<Option<Vec<Rgb>>> {
-        Ok(Sidecar::adaptive(self, threshold, most, seed)?)
+    fn adaptive(
+        &mut self,
+        threshold: f64,
+        most: Option<u64>,
+        seed: u32,
+        part: Option<Tile>,
+    ) -> anyhow::Result<Option<Vec<Rgb>>> {
+        Ok(Sidecar::adaptive(self, threshold, most, seed, part)?)
     }
 
     fn notes(&self) -> Vec<String> {

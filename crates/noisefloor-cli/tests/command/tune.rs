@@ -207,6 +207,74 @@ fn a_setting_for_a_sequence_is_that_of_its_hardest_frame() {
     fail(&[&base[..], &["--frames", "1,2,3"]].concat(), &["shot3", "has changed"]);
 }
 
+/// A program with two noisy places, which renders what part of the picture it is asked for, and writes that down.
+#[test]
+fn only_the_worst_places_are_looked_at_again() {
+    let Some(python) = require_python() else { return };
+    let folder = tempdir().unwrap();
+    let (script, asked) = (folder.path().join("render.py"), folder.path().join("asked"));
+    let program = "import array, random, sys\n\
+        threshold, seed, out, asked = float(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:5]\n\
+        x0, y0, x1, y1 = map(int, sys.argv[5:])\n\
+        open(asked, 'a').write(f'{x0} {y0} {x1} {y1}\\n')\n\
+        def times(x, y): return 2.5 if x >= 256 and y < 64 else 2 if x < 64 and y >= 128 else 0.5\n\
+        draw = random.Random(seed).gauss\n\
+        rows = [[[draw(0.5, times(x, y) * threshold) for _ in range(3)] for x in range(320)] for y in range(192)]\n\
+        part = [v for row in reversed(rows[y0:y1]) for pixel in row[x0:x1] for v in pixel]\n\
+        open(out, 'wb').write(b'PF\\n%d %d\\n-1\\n' % (x1 - x0, y1 - y0) + array.array('f', part).tobytes())\n";
+    std::fs::write(&script, program).unwrap();
+    let (python, script) = (text(&python).to_owned(), script.display());
+    let asked_path = asked.display();
+    let whole =
+        format!("command: {python} {script} {{threshold}} {{seed}} {{out}}.pfm {asked_path} 0 0 320 192");
+    let parts = whole.replace("0 0 320 192", "{x0} {y0} {x1} {y1}");
+    let search = |source: &str, more: &[&str]| {
+        let args = ["tune", "--source", source, "--size", "320x192", "--from", "0.02", "--json"];
+        let answer = succeed(&[&args, more].concat());
+        (serde_json::from_str::<Value>(&answer).unwrap(), std::fs::read_to_string(&asked).unwrap())
+    };
+    let (all, _) = search(&whole, &[]);
+    std::fs::write(&asked, "").unwrap();
+    let (some, log) = search(&parts, &["--regions", "2"]);
+    // The lower left is worse than the rest, the upper right worse still: squares with half of one around
+    assert_eq!(some["regions"][0], serde_json::json!([192, 0, 128, 128]), "{some}");
+    assert_eq!(some["regions"][1][0], 0, "{some}");
+    let lines: Vec<&str> = log.lines().collect();
+    assert_eq!(lines[..4], ["0 0 320 192", "0 0 320 192", "192 0 320 128", "192 0 320 128"]);
+    assert!(lines[2..].iter().all(|line| *line != "0 0 320 192"), "{log}");
+    // The same worst place says the same, with the exposure of the whole; windows at the crop's edge see less
+    let [all_ratio, some_ratio] = [&all, &some].map(|report| report["steps"][1]["ratio"].as_f64().unwrap());
+    assert!((all_ratio / some_ratio).ln().abs() < 0.1, "{all} {some}");
+    let place = |report: &Value| {
+        let worst = &report["steps"][1];
+        (worst["x"].as_u64().unwrap() >= 256, worst["y"].as_u64().unwrap() < 64)
+    };
+    assert_eq!([place(&all), place(&some)], [(true, true); 2]);
+
+    let (whole, size) = (whole.as_str(), ["--size", "320x192", "--regions", "2"]);
+    fail(&[&["tune", "--source", whole][..], &size].concat(), &["{x0}"]);
+    let half = parts.replace(" {y1}", "");
+    fail(&[&["tune", "--source", &half][..], &size].concat(), &["{y1} is missing"]);
+    fail(
+        &["tune", "--source", "luxcore", "scene.cfg", "--regions", "2"],
+        &["--regions", "as it is in the whole"],
+    );
+    fail(&["tune", "cornell-box", "--regions", "2", "--keep", "out"], &["--keep"]);
+}
+
+/// Tiles of the worst place alone get more samples, which find what all of them would.
+#[test]
+fn samples_are_found_in_the_worst_place_alone() {
+    let args = ["tune", "cornell-box", "--size", "256x128", "--json"];
+    let search = |more: &[&str]| serde_json::from_str::<Value>(&succeed(&[&args, more].concat())).unwrap();
+    let (all, some) = (search(&[]), search(&["--regions", "1"]));
+    assert_eq!(some["regions"].as_array().unwrap().len(), 1, "{some}");
+    assert_eq!(all["steps"][0]["ratio"], some["steps"][0]["ratio"]);
+    let setting = |report: &Value| report["setting"].as_f64().unwrap();
+    // The worst place of later settings may be another
+    assert!((setting(&some) / setting(&all)).ln().abs() < 0.4, "{all} {some}");
+}
+
 /// Samples grow from nothing again, to the same pictures.
 #[test]
 fn a_search_for_samples_is_resumed() {

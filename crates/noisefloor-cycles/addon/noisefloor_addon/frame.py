@@ -67,7 +67,8 @@ class Frame:
         cells = -(-self.size[1] // CELL), -(-self.size[0] // CELL)
         self.effort, self.ratio = numpy.zeros(cells), numpy.full(cells, numpy.inf)
         self.excess, self.reason, self.thresholds = None, None, []
-        self.begun, self.sampled = time.monotonic(), 0
+        # Samples, over all pixels, and how many of them are expected in the end
+        self.begun, self.sampled, self.expected = time.monotonic(), 0, None
         # What the windows draw meanwhile, and how often it has changed
         self.shown, self.shows = numpy.zeros((*self.size[::-1], 4), numpy.float32), 0
         self._add_passes(depsgraph)
@@ -191,6 +192,10 @@ class Frame:
             cells = slice(y // CELL, -(-(y + height) // CELL)), slice(x // CELL, -(-(x + width) // CELL))
             self.ratio[cells] = numpy.maximum(self.ratio[cells], ratio)
         self.tuning.tell(self.excess.ratio)
+        # What fails by so much needs the square of that as many samples, as far as it is noise
+        spp = sum(half.samples for half in self.halves)[..., 0]
+        times = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2, numpy.ones((CELL, CELL)))
+        self.expected = float((spp * times[: self.size[1], : self.size[0]]).sum())
         return self.tuning.ending
 
     def _cancelled(self):
@@ -249,13 +254,10 @@ class Frame:
 
     def progress(self):
         """Share of the samples that are taken, and seconds left; None while unknown."""
-        if self.excess is None or not self.excess.ratio < math.inf:
+        if self.expected is None:
             return None, None
-        spp = sum(half.samples for half in self.halves)[..., 0]
-        need = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2 - 1, numpy.ones((CELL, CELL)))
-        left = float((spp * need[: self.size[1], : self.size[0]]).sum())
-        seconds = time.monotonic() - self.begun
-        return self.sampled / max(self.sampled + left, 1), seconds * left / max(self.sampled, 1)
+        seconds, left = time.monotonic() - self.begun, max(self.expected - self.sampled, 0.0)
+        return min(self.sampled / self.expected, 1.0), seconds * left / max(self.sampled, 1)
 
     def summary(self):
         """One line."""

@@ -126,7 +126,7 @@ def _render(engine, depsgraph):
         if share is not None:
             engine.update_progress(share)
 
-    error = None
+    error, state.status = None, "noisefloor: the first picture"
     try:
         frame.run(report)
     except Exception as caught:  # what there is, is kept

@@ -178,11 +178,12 @@ class Fake:
             os.write(replies, struct.pack("<II", 100, 0) + b"{")
             os._exit(0)
 
-    def adaptive(self, threshold, samples, seed):
+    def adaptive(self, threshold, samples, seed, part):
         if self.options.get("how") != "sample adaptively":
             return None
         value = [threshold, float(samples or 0), float(seed)]
-        return array.array("f", value * (self.info["width"] * self.info["height"]))
+        _, _, width, height = part or (0, 0, self.info["width"], self.info["height"])
+        return array.array("f", value * (width * height))
 
 
 host.serve(Fake)

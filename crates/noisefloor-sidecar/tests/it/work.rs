@@ -50,12 +50,15 @@ fn what_is_asked_for_reaches_the_renderer() {
 #[test]
 fn an_adaptive_picture_comes_whole() {
     let Some(fake) = Fake::new("sample adaptively") else { return };
-    let picture = fake.open().unwrap().adaptive(0.25, Some(64), 7).unwrap();
+    let picture = fake.open().unwrap().adaptive(0.25, Some(64), 7, None).unwrap();
     assert_eq!(picture, Some(vec![[0.25, 64.0, 7.0]; SIZE.0 * SIZE.1]));
-    let picture = fake.open().unwrap().adaptive(0.5, None, 0).unwrap();
+    let picture = fake.open().unwrap().adaptive(0.5, None, 0, None).unwrap();
     assert_eq!(picture, Some(vec![[0.5, 0.0, 0.0]; SIZE.0 * SIZE.1]));
+    let part = Tile { index: 0, x: 1, y: 2, width: 3, height: 2 };
+    let picture = fake.open().unwrap().adaptive(0.5, None, 0, Some(part)).unwrap();
+    assert_eq!(picture, Some(vec![[0.5, 0.0, 0.0]; 6]));
     let Some(fake) = Fake::new("work") else { return };
-    assert_eq!(fake.open().unwrap().adaptive(0.5, None, 0).unwrap(), None);
+    assert_eq!(fake.open().unwrap().adaptive(0.5, None, 0, None).unwrap(), None);
 }
 
 /// More tiles than one header may name: as many calls as it takes, and nothing of it shows.

@@ -4,7 +4,7 @@ mod keep;
 mod pictures;
 
 use crate::tune::keep::Keep;
-use crate::tune::pictures::{Judged, Judges, View};
+use crate::tune::pictures::{CROP, Crop, Judged, Judges, View};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
@@ -25,6 +25,8 @@ pub struct TuneJob {
     pub source: SourceJob,
     /// The frames of a sequence that are looked at; none if it is one picture.
     pub frames: Vec<u32>,
+    /// Crops that are rendered after the first setting; 0 for the whole picture.
+    pub regions: usize,
     pub resources: Resources,
     pub tuning: Tuning,
     /// Most samples per pixel of a picture with a threshold.
@@ -90,6 +92,9 @@ struct Report {
     /// The frames of a sequence, worst first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     frames: Vec<u32>,
+    /// The crops, worst first: x, y, width and height.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    regions: Vec<[usize; 4]>,
     steps: Vec<Row>,
     seconds: f64,
     /// What the search depends on: it is resumed only by the same.
@@ -134,11 +139,19 @@ pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
 /// A search in progress.
 struct Search<'a> {
     tuning: Tuning,
-    /// One, or the frames of a sequence, worst first.
+    /// One, or the frames of a sequence.
     views: Vec<View>,
+    /// What is looked at, worst first.
+    places: Vec<Place>,
     judges: Judges<'a>,
     identity: Vec<SourceIdentity>,
     rows: Vec<Row>,
+}
+
+/// A view, or a part of it.
+struct Place {
+    view: usize,
+    crop: Option<Crop>,
 }
 
 impl<'a> Search<'a> {
@@ -153,13 +166,18 @@ impl<'a> Search<'a> {
         let views = frames.into_iter().map(|frame| View::open(job, frame));
         let views: Vec<View> = views.collect::<anyhow::Result<_>>()?;
         let identity: anyhow::Result<_> = views.iter().map(|view| view.identity(job, &judges)).collect();
-        Ok(Self { tuning: job.tuning.clone(), identity: identity?, views, judges, rows: Vec::new() })
+        let places = (0..views.len()).map(|view| Place { view, crop: None }).collect();
+        Ok(Self { tuning: job.tuning.clone(), identity: identity?, views, places, judges, rows: Vec::new() })
     }
 
     /// Takes over what an earlier search has found.
     fn resume(&mut self, keep: &Keep, job: &TuneJob) -> anyhow::Result<()> {
         let Some(kept) = keep.earlier(&self.identity)? else { return Ok(()) };
-        self.views.sort_by_key(|view| kept.frames.iter().position(|frame| view.frame == Some(*frame)));
+        let hard = |place: &Place| {
+            let frame = self.views[place.view].frame;
+            kept.frames.iter().position(|kept| frame == Some(*kept))
+        };
+        self.places.sort_by_key(hard);
         for row in kept.steps {
             // With another --from or --to, the search may go another way from some step on
             if !matches!(self.tuning.next(), Next::Render { setting, .. } if setting == row.setting) {
@@ -174,42 +192,47 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Renders and judges two pictures of every frame; from the second setting on, only until one fails, in the order
+    /// Renders and judges two pictures of every place; from the second setting on, only until one fails, in the order
     /// in which they were hard. Of the worst, what is found.
     fn step(&mut self, job: &TuneJob, each: f64, setting: f64) -> anyhow::Result<(Row, Judged)> {
         let (mut rendering, mut judging) = (Duration::ZERO, Duration::ZERO);
         let mut found: Vec<(usize, Judged)> = Vec::new();
-        for (place, view) in self.views.iter_mut().enumerate() {
-            let what = match view.frame {
-                Some(frame) => format!("{} {setting}, frame {frame}", name(job.tuning.knob())),
-                None => format!("{} {setting}", name(job.tuning.knob())),
-            };
+        for (number, Place { view, crop }) in self.places.iter().enumerate() {
+            let view = &mut self.views[*view];
+            let mut what = format!("{} {setting}", name(job.tuning.knob()));
+            if let Some(frame) = view.frame {
+                what += &format!(", frame {frame}");
+            }
+            if let Some(crop) = crop {
+                what += &format!(", around ({}, {})", crop.tile.x + CROP / 2, crop.tile.y + CROP / 2);
+            }
             let bar = spinner(job.quiet, format!("{what}: two pictures"));
             let start = Instant::now();
-            let pair = view.pictures.pair(each, &bar)?;
+            let pair = view.pictures.pair(each, crop.as_ref().map(|crop| crop.tile), &bar)?;
             rendering += start.elapsed();
             bar.set_message(format!("{what}: judging"));
             let start = Instant::now();
-            let judged = self.judges.judge(pair, view.guides.as_ref())?;
+            let judged = self.judges.judge(pair, view.guides.as_ref(), crop.as_ref())?;
             judging += start.elapsed();
             bar.finish_and_clear();
             let fails = judged.excess.ratio > 1.0;
-            found.push((place, judged));
+            found.push((number, judged));
             if fails && !self.rows.is_empty() {
                 break;
             }
         }
         found.sort_by(|(_, a), (_, b)| b.excess.ratio.total_cmp(&a.excess.ratio));
-        let frame = self.views[found[0].0].frame;
-        if self.rows.is_empty() {
-            let place =
-                |view: &View| found.iter().position(|(place, _)| self.views[*place].frame == view.frame);
-            let order: Vec<Option<usize>> = self.views.iter().map(place).collect();
-            let mut views: Vec<_> = order.into_iter().zip(std::mem::take(&mut self.views)).collect();
-            views.sort_by_key(|(place, _)| *place);
-            self.views = views.into_iter().map(|(_, view)| view).collect();
+        let worst = found[0].0;
+        let frame = self.views[self.places[worst].view].frame;
+        if !self.rows.is_empty() {
+            self.places[..=worst].rotate_right(1);
+        } else if job.regions > 0 {
+            self.places = self.worst_crops(job.regions, &found);
         } else {
-            self.views[..=found[0].0].rotate_right(1);
+            self.places = found
+                .iter()
+                .map(|(number, _)| Place { view: self.places[*number].view, crop: None })
+                .collect();
         }
         let (_, worst) = found.swap_remove(0);
         self.tuning.tell(worst.excess);
@@ -226,6 +249,43 @@ impl<'a> Search<'a> {
             judging_seconds: judging.as_secs_f64(),
         };
         Ok((row, worst))
+    }
+
+    /// So many crops around the worst squares of whole pictures, none of them in the middle of another.
+    fn worst_crops(&self, count: usize, found: &[(usize, Judged)]) -> Vec<Place> {
+        let squares = found.iter().flat_map(|(number, judged)| {
+            let view = self.places[*number].view;
+            judged.squares.iter().map(move |square| (view, judged, square))
+        });
+        let mut squares: Vec<_> = squares.collect();
+        squares.sort_by(|(.., (_, a)), (.., (_, b))| b.total_cmp(a));
+        let mut places: Vec<Place> = Vec::new();
+        for (view, judged, (square, _)) in squares {
+            let crop = Crop::around(*square, judged, &self.judges);
+            let apart = |place: &Place| match &place.crop {
+                Some(other) => {
+                    place.view != view
+                        || other.tile.x.abs_diff(crop.tile.x) >= CROP / 2
+                        || other.tile.y.abs_diff(crop.tile.y) >= CROP / 2
+                }
+                None => true,
+            };
+            if places.len() < count && places.iter().all(apart) {
+                places.push(Place { view, crop: Some(crop) });
+            }
+        }
+        places
+    }
+
+    /// Those of a sequence, worst first.
+    fn frames(&self) -> Vec<u32> {
+        let mut frames = Vec::new();
+        for frame in self.places.iter().filter_map(|place| self.views[place.view].frame) {
+            if !frames.contains(&frame) {
+                frames.push(frame);
+            }
+        }
+        frames
     }
 
     fn report(&self, ending: Option<Ending>) -> Report {
@@ -247,7 +307,8 @@ impl<'a> Search<'a> {
             too_coarse,
             ending,
             judged: self.judges.said(),
-            frames: self.views.iter().filter_map(|view| view.frame).collect(),
+            frames: self.frames(),
+            regions: self.places.iter().filter_map(|place| place.crop.as_ref()).map(Crop::corners).collect(),
             steps: self.rows.clone(),
             seconds: self.rows.iter().map(|row| row.seconds + row.judging_seconds).sum(),
             identity: self.identity.clone(),
@@ -331,8 +392,16 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
     }
     if matches!(ending, Ending::Found { .. }) {
         let last: f64 = report.steps.last().map_or(0.0, |step| step.seconds);
-        let pictures = if report.frames.len() > 1 { "the last pictures" } else { "the last two pictures" };
+        let many = report.frames.len() > 1 || !report.regions.is_empty();
+        let pictures = if many { "the last pictures" } else { "the last two pictures" };
         say!("{}; {:.0} s, of which {pictures} took {last:.0} s", report.judged, report.seconds)?;
+        if !report.regions.is_empty() {
+            let places = match report.regions.len() {
+                1 => "the place that was".to_owned(),
+                count => format!("the {count} places that were"),
+            };
+            say!("only {places} worst with the coarsest setting had another look")?;
+        }
     }
     Ok(())
 }

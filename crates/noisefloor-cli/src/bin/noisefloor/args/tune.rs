@@ -40,6 +40,7 @@ use std::path::PathBuf;
   noisefloor tune shot.blend --source cycles --fps 24         for the frames of a film
   noisefloor tune hall/scene.xml --source mitsuba             samples per pixel
   noisefloor tune 'walk.{frame:04}.xml' --frames 1,50,120     one setting for a sequence
+  noisefloor tune shot.blend --source cycles --regions 4      only the four worst places, after a first look
   noisefloor tune --source 'command: myrender {scene} --noise {threshold} --seed {seed} -o {out}.exr' hall.ass
   noisefloor tune cornell-box --size 192x192 --keep out/tuned --json")]
 pub struct TuneArgs {
@@ -79,6 +80,10 @@ pub struct TuneArgs {
     /// All are rendered with the first setting, then the worst first, until one fails.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     frames: Vec<u32>,
+    /// Render the whole picture only with the first setting, and then this many crops of 128 pixels around what was worst:
+    /// for large pictures.
+    #[arg(long, value_name = "COUNT", conflicts_with = "keep", value_parser = clap::value_parser!(u64).range(1..=64))]
+    regions: Option<u64>,
     /// Print JSON instead of lines.
     #[arg(long)]
     json: bool,
@@ -136,6 +141,21 @@ impl TuneArgs {
             }
             _ => {}
         }
+        let crops = match &source.kind {
+            SourceKind::Adapter(adapter) => adapter.crops,
+            SourceKind::Command(template) => template.contains("{x0}"),
+            SourceKind::Ptwne(_) | SourceKind::Exr => true,
+        };
+        if self.regions.is_some() && choice == KnobChoice::Threshold && !crops {
+            match &source.kind {
+                SourceKind::Command(_) => {
+                    refuse!("--regions: the command does not hold {{x0}}, {{y0}}, {{x1}} and {{y1}}")
+                }
+                _ => refuse!(
+                    "--regions: --source {name} cannot render a part of a picture as it is in the whole"
+                ),
+            }
+        }
         let whole = |option, value: Option<f64>, default: u64| -> anyhow::Result<u64> {
             match value {
                 None => Ok(default),
@@ -189,6 +209,7 @@ impl TuneArgs {
         Ok(TuneJob {
             source,
             frames: self.frames,
+            regions: self.regions.unwrap_or(0) as usize,
             resources,
             tuning,
             most_spp: self.max_spp,

@@ -3,10 +3,11 @@
 use super::{TuneCriterion, TuneJob, name};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
+use noisefloor::display::Display;
 use noisefloor::source::{FirstHits, SourceIdentity};
 use noisefloor::stills::StillError;
-use noisefloor::tune::{Excess, Knob, PicturePair};
-use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, TileGrid, display::Display};
+use noisefloor::tune::{Excess, Knob, PicturePair, most_in_squares};
+use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::{FIRST_HITS_SPP, Opened, Resources, Source, SourceJob, SourceKind};
@@ -38,6 +39,38 @@ pub struct Pair {
     spp: Option<f64>,
 }
 
+/// Edge of crops, in pixels: a square that is judged, and half of one around it.
+pub const CROP: usize = 128;
+
+/// A part of a picture.
+pub struct Crop {
+    pub tile: Tile,
+    /// With the exposure of the whole.
+    tone: ToneMapping,
+}
+
+impl Crop {
+    pub fn around(square: Tile, whole: &Judged, judges: &Judges<'_>) -> Self {
+        let (width, height) = whole.size;
+        let place = |at: usize, edge: usize, side: usize| {
+            (at + edge / 2).saturating_sub(CROP / 2).min(side.saturating_sub(CROP))
+        };
+        let (x, y) = (place(square.x, square.width, width), place(square.y, square.height, height));
+        let tone = match &judges.params.tone_mapping {
+            ToneMapping::Reinhard { white, .. } => {
+                ToneMapping::ReinhardAt { exposure: whole.display.exposure(), white: *white }
+            }
+            other => other.clone(),
+        };
+        Self { tile: Tile { index: 0, x, y, width: CROP.min(width), height: CROP.min(height) }, tone }
+    }
+
+    pub fn corners(&self) -> [usize; 4] {
+        let Tile { x, y, width, height, .. } = self.tile;
+        [x, y, width, height]
+    }
+}
+
 /// What was found of a pair, and the picture that people would look at.
 pub struct Judged {
     pub excess: Excess,
@@ -49,6 +82,8 @@ pub struct Judged {
     pub display: Display,
     /// What is left: noise, 1 is the limit; or JODs lost.
     pub map: Vec<f32>,
+    /// How far each square is from what may be seen there.
+    pub squares: Vec<(Tile, f64)>,
     /// Samples per pixel of the mean.
     pub spp: Option<f64>,
 }
@@ -136,21 +171,23 @@ impl Pictures {
         Ok(source.first_hits(1, FIRST_HITS_SPP)?.map(|b| [a, b]))
     }
 
-    /// Two pictures, each with this setting.
-    pub fn pair(&mut self, each: f64, bar: &ProgressBar) -> anyhow::Result<Pair> {
+    /// Two pictures, or a part of them, each with this setting.
+    pub fn pair(&mut self, each: f64, part: Option<Tile>, bar: &ProgressBar) -> anyhow::Result<Pair> {
         match self {
-            Self::Samples { source, film } => grow(source.as_mut(), film, each as u64, bar),
+            Self::Samples { source, film } => grow(source.as_mut(), film, each as u64, part, bar),
             Self::Adaptive { source, most, seeds } => {
                 let info = source.info();
                 let mut one = |seed| {
-                    let picture = source.adaptive(each, *most, seed)?;
+                    let picture = source.adaptive(each, *most, seed, part)?;
                     picture.with_context(|| format!("{} has no noise threshold", info.name))
                 };
                 let pictures = [one(seeds[0])?, one(seeds[1])?];
-                Ok(Pair { size: (info.width, info.height), pictures, spp: None })
+                let size = part.map_or((info.width, info.height), |part| (part.width, part.height));
+                Ok(Pair { size, pictures, spp: None })
             }
             Self::Program { command, most, seeds } => {
-                let (a, b) = (command.render(each, *most, seeds[0])?, command.render(each, *most, seeds[1])?);
+                let one = |seed| command.render(each, *most, seed, part);
+                let (a, b) = (one(seeds[0])?, one(seeds[1])?);
                 if (a.width, a.height) != (b.width, b.height) {
                     bail!(
                         "the program wrote {}×{} and then {}×{} pixels",
@@ -179,16 +216,30 @@ fn seeds(seed: u64) -> [u32; 2] {
     [scatter(0), scatter(1)]
 }
 
-/// Samples the whole picture until each half has so many samples per pixel.
-fn grow(source: &mut dyn Source, film: &mut Film, each: u64, bar: &ProgressBar) -> anyhow::Result<Pair> {
+/// Samples the picture, or the tiles of a part of it, until each half has so many samples per pixel.
+fn grow(
+    source: &mut dyn Source,
+    film: &mut Film,
+    each: u64,
+    part: Option<Tile>,
+    bar: &ProgressBar,
+) -> anyhow::Result<Pair> {
     let grid = film.grid();
+    let part = part.unwrap_or(Tile { index: 0, x: 0, y: 0, width: grid.width(), height: grid.height() });
+    let touches = |tile: &Tile| {
+        let along = |a: usize, an: usize, b: usize, bn: usize| a < b + bn && b < a + an;
+        along(tile.x, tile.width, part.x, part.width) && along(tile.y, tile.height, part.y, part.height)
+    };
+    let tiles: Vec<Tile> = grid.tiles().filter(touches).collect();
     loop {
-        let have = film.spp(0);
+        // Parts may overlap: some tiles have more than others
+        let have = tiles.iter().map(|tile| film.spp(tile.index)).min().unwrap_or(0);
         let Some(missing) = (2 * each).checked_sub(have).filter(|missing| *missing > 0) else { break };
         bar.set_message(format!("{have} of {} samples per pixel", 2 * each));
         // A request belongs to the half with fewer: in pairs, both stay alike
         let spp = missing.div_ceil(2).min(BATCH);
-        let requests: Vec<_> = grid.tiles().map(|tile| film.request(tile.index, spp)).collect();
+        let behind = tiles.iter().filter(|tile| film.spp(tile.index) < 2 * each);
+        let requests: Vec<_> = behind.map(|tile| film.request(tile.index, spp)).collect();
         for batch in source.sample(&requests)? {
             if batch.spp == 0 {
                 bail!("the source has no more samples");
@@ -196,14 +247,20 @@ fn grow(source: &mut dyn Source, film: &mut Film, each: u64, bar: &ProgressBar) 
             film.add(batch.tile.index, batch.spp, &batch.mean)?;
         }
     }
-    let mut pictures = [0, 1].map(|_| vec![[0.0; 3]; grid.width() * grid.height()]);
-    for tile in grid.tiles() {
+    let mut whole = [0, 1].map(|_| vec![[0.0; 3]; grid.width() * grid.height()]);
+    for tile in tiles {
         for pixel in tile.rows(grid.width()).flatten() {
             let [(a, _), (b, _)] = film.pixel_halves(tile.index, pixel);
-            (pictures[0][pixel], pictures[1][pixel]) = (a, b);
+            (whole[0][pixel], whole[1][pixel]) = (a, b);
         }
     }
-    Ok(Pair { size: (grid.width(), grid.height()), pictures, spp: Some(each as f64) })
+    let pictures = whole.map(|picture| cut(part, grid.width(), &picture));
+    Ok(Pair { size: (part.width, part.height), pictures, spp: Some(each as f64) })
+}
+
+/// A part of a picture of this width.
+fn cut(part: Tile, width: usize, picture: &[Rgb]) -> Vec<Rgb> {
+    part.rows(width).flatten().map(|pixel| picture[pixel]).collect()
 }
 
 /// What judges pairs.
@@ -247,8 +304,31 @@ impl<'a> Judges<'a> {
         }
     }
 
-    pub fn judge(&mut self, pair: Pair, guides: Option<&[FirstHits; 2]>) -> anyhow::Result<Judged> {
+    pub fn judge(
+        &mut self,
+        pair: Pair,
+        guides: Option<&[FirstHits; 2]>,
+        crop: Option<&Crop>,
+    ) -> anyhow::Result<Judged> {
         let Pair { size, pictures, spp } = pair;
+        let mut params = self.params.clone();
+        if let Some(crop) = crop {
+            params.tone_mapping = crop.tone.clone();
+        }
+        let guides = guides.map(|guides| match crop {
+            None => guides.clone(),
+            Some(Crop { tile, .. }) => guides.each_ref().map(|whole| FirstHits {
+                width: tile.width,
+                height: tile.height,
+                albedo: cut(*tile, whole.width, &whole.albedo),
+                normal: cut(*tile, whole.width, &whole.normal),
+            }),
+        });
+        // In the whole picture
+        let in_whole = |excess: Excess| {
+            let (x, y) = crop.map_or((0, 0), |crop| (crop.tile.x, crop.tile.y));
+            Excess { place: excess.place.map(|place| (place.0 + x, place.1 + y)), ..excess }
+        };
         let halves = PicturePair::new(size, pictures.clone(), spp.unwrap_or(128.0));
         let halves = halves.map_err(|error| match error {
             StillError::Same => anyhow::anyhow!(
@@ -257,7 +337,7 @@ impl<'a> Judges<'a> {
             ),
             other => other.into(),
         })?;
-        let compared = halves.compare(&self.params)?;
+        let compared = halves.compare(&params)?;
         if !std::mem::replace(&mut self.warned, true) {
             compared.warnings().iter().for_each(|warning| note!("warning: {warning}"));
         }
@@ -269,20 +349,22 @@ impl<'a> Judges<'a> {
                 let wants = denoiser.wants();
                 let guided = |pixels, half: usize| {
                     let picture = NoisyPicture::new(size, pixels);
-                    guides.map_or(picture, |guides| picture.guided(&guides[half], wants))
+                    guides.as_ref().map_or(picture, |guides| picture.guided(&guides[half], wants))
                 };
                 let noisy = [pictures[0].as_slice(), &pictures[1]];
                 let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;
                 let error =
                     DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
-                let DenoisedExcess { worst, map, .. } = error.excess(*lost, &self.params.viewing)?;
-                let excess = Excess { pictures: halves.digest(), ..worst };
+                let DenoisedExcess { worst, squares, map } = error.excess(*lost, &params.viewing)?;
+                let excess = in_whole(Excess { pictures: halves.digest(), ..worst });
                 let denoised = Some(denoiser.denoise(&guided(&mean, 0))?);
-                Ok(Judged { excess, size, mean, denoised, display, map, spp })
+                Ok(Judged { excess, size, mean, denoised, display, map, squares, spp })
             }
             (TuneCriterion::Noise(oracle), _) => {
-                let (excess, map) = halves.noise(oracle, &self.params)?;
-                Ok(Judged { excess, size, mean, denoised: None, display, map, spp })
+                let (excess, map) = halves.noise(oracle, &params)?;
+                let squares = most_in_squares(size, &map);
+                let excess = in_whole(excess);
+                Ok(Judged { excess, size, mean, denoised: None, display, map, squares, spp })
             }
             (TuneCriterion::Denoised { .. }, None) => bail!("the denoiser was not started"),
         }
