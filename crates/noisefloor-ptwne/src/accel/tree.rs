@@ -72,10 +72,10 @@ impl Tree {
                 .map(|(own, part, place, leaves)| (Branch::new(own, part, most, leaves), place))
                 .collect();
             for (branch, [node, lane, level]) in grown.into_iter().rev() {
-                let (nodes, leaf) = (tree.nodes.len() as u32, leaves.append(branch.leaves));
-                let moved = |child: u32| child + if child & LEAF == 0 { nodes } else { leaf };
-                tree.nodes.extend(branch.nodes.into_iter().map(|n| Node { child: n.child.map(moved), ..n }));
-                tree.nodes[node].child[lane] = moved(branch.root);
+                let by = [tree.nodes.len() as u32, leaves.append(branch.leaves)];
+                tree.nodes[node].child[lane] = moved(branch.root, by);
+                let child = |n: &Node| n.child.map(|child| moved(child, by));
+                tree.nodes.extend(branch.nodes.into_iter().map(|n| Node { child: child(&n), ..n }));
                 depth = depth.max(level + branch.depth);
             }
             surfaces.truncate(first);
@@ -216,6 +216,11 @@ impl Tree {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())
     }
+}
+
+/// A child after so many other nodes and leaves.
+fn moved(child: u32, [nodes, leaves]: [u32; 2]) -> u32 {
+    child + if child & LEAF == 0 { nodes } else { leaves }
 }
 
 /// A subtree, with nodes and leaves of its own.
