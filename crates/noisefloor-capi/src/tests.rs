@@ -416,12 +416,14 @@ fn tone_mappings_of_ones_own_judge_as_in_rust() {
 
         assert_eq!((nf_tone_free(tone), nf_tone_free(tone)), (NfStatus::Ok, NfStatus::Handle));
         round(&by_c, 1); // the session does not need it any more
-        let mut late = null_mut();
-        // SAFETY: a pointer to parameters, and a variable of this function.
-        assert_eq!(
-            unsafe { nf_session_new(WIDTH, HEIGHT, null(), &shown, &mut late) },
-            NfStatus::NullPointer
-        );
+        let (mut oracle, mut late) = (null_mut(), null_mut());
+        // SAFETY: pointers to variables of this function, and a handle that was just made.
+        unsafe {
+            assert_eq!(nf_oracle_bundled(0.95, &mut oracle), NfStatus::Ok);
+            let status = nf_session_new(WIDTH, HEIGHT, oracle, &shown, &mut late);
+            assert!(status == NfStatus::Handle && message().contains("tone"), "{}", message());
+            assert_eq!(nf_oracle_free(oracle), NfStatus::Ok);
+        }
     }
     assert!(found[0] != found[1] && found.iter().all(|ratio| *ratio > 0.0), "both show the same: {found:?}");
     let broken = |text: &str, input: *const c_char| {
