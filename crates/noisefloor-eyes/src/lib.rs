@@ -515,23 +515,23 @@ mod tests {
         let before = std::fs::read(&path).unwrap();
         Eyes::check_keep(&path, "you").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), before);
-        let said = |path: &Path, name| Eyes::check_keep(path, name).unwrap_err().to_string();
-        assert!(said(&path, "").contains("empty") && said(&path, "a\nb").contains("printable"));
-        assert!(said(folder.path(), "me").contains("a folder"));
+        let refusal = |path: &Path, name| Eyes::check_keep(path, name).unwrap_err().to_string();
+        assert!(refusal(&path, "").contains("empty") && refusal(&path, "a\nb").contains("printable"));
+        assert!(refusal(folder.path(), "me").contains("a folder"));
         std::fs::write(&path, "version = 2\nwho = \"me\"").unwrap();
-        assert!(said(&path, "me").contains("version 2 of a newer noisefloor"), "{}", said(&path, "me"));
+        assert!(refusal(&path, "me").contains("version 2 of a newer noisefloor"), "{}", refusal(&path, "me"));
         let long = format!("{}\n#{}", String::from_utf8(before).unwrap(), "x".repeat(1 << 20));
         std::fs::write(&path, long).unwrap();
-        assert!(said(&path, "me").contains("longer than a megabyte"));
+        assert!(refusal(&path, "me").contains("longer than a megabyte"));
     }
 
     #[test]
     fn nine_of_ten_are_content() {
-        let of = |count: u32| {
+        let strictest_tenths = |count: u32| {
             let people = (1..=count).map(|i| person(&format!("p{i}"), 0.1 * f64::from(i))).collect();
             (Eyes(people).strictest().factor * 10.0).round() as u32
         };
-        assert_eq!([1, 2, 9, 10, 11, 20].map(of), [1, 2, 9, 9, 10, 18]);
+        assert_eq!([1, 2, 9, 10, 11, 20].map(strictest_tenths), [1, 2, 9, 9, 10, 18]);
     }
 
     #[test]

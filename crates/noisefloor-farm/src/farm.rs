@@ -155,8 +155,8 @@ impl<'a, S: Studio> Farm<'a, S> {
     fn job(&self, index: usize) -> Result<S::Job, FarmError> {
         let job = self.planned_job(index);
         let Some(frames) = self.plan.frames.filter(|_| self.plan.waits(index)) else { return Ok(job) };
-        let of = |&frame: &u32| (frame, self.folder.frame(&FrameRange::folder(frame)));
-        let first: Vec<_> = self.plan.first.iter().map(of).collect();
+        let with_folder = |&frame: &u32| (frame, self.folder.frame(&FrameRange::folder(frame)));
+        let first: Vec<_> = self.plan.first.iter().map(with_folder).collect();
         Ok(self.studio.after(&job, frames.first().saturating_add(index as u32), &first)?)
     }
 

@@ -99,9 +99,14 @@ impl ShardJob {
         }
         let names = || self.params.as_object().into_iter().flat_map(|params| params.keys());
         let differing = names().find(|name| self.params.get(name) != kept.params.get(name));
-        let of = |params: &Value| differing.and_then(|name| params.get(name)).unwrap_or(params).to_string();
+        let differing_value =
+            |params: &Value| differing.and_then(|name| params.get(name)).unwrap_or(params).to_string();
         let what = differing.map_or("set of parameters", String::as_str).to_owned();
-        Err(ShardError::Other { what, kept: of(&kept.params), now: of(&self.params) })
+        Err(ShardError::Other {
+            what,
+            kept: differing_value(&kept.params),
+            now: differing_value(&self.params),
+        })
     }
 }
 

@@ -101,12 +101,12 @@ mod tests {
 
     #[test]
     fn what_is_as_good_as_the_best_stays() {
-        let of = |error: f64, by_group: [f64; 4]| (error, by_group.to_vec());
-        let best = of(1.2, [0.1, 0.2, 0.2, 0.2]);
+        let scored = |error: f64, by_group: [f64; 4]| (error, by_group.to_vec());
+        let best = scored(1.2, [0.1, 0.2, 0.2, 0.2]);
         // Worse by 0.05 on average, in one group by much, in the others not at all: 0.05 is its standard error
-        let nearly = of(1.25, [0.3, 0.2, 0.2, 0.2]);
+        let nearly = scored(1.25, [0.3, 0.2, 0.2, 0.2]);
         // Worse by 0.04 everywhere
-        let worse = of(1.24, [0.14, 0.24, 0.24, 0.24]);
+        let worse = scored(1.24, [0.14, 0.24, 0.24, 0.24]);
         assert_eq!(chosen_of(&[worse.clone(), nearly.clone(), best.clone()]), Some(1));
         assert_eq!(chosen_of(&[worse.clone(), best.clone(), nearly]), Some(1));
         assert_eq!(chosen_of(&[worse, best]), Some(1));

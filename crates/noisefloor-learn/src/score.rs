@@ -109,13 +109,13 @@ mod tests {
     #[test]
     fn calibration_is_the_distance_from_the_diagonal() {
         // People stop at 50 or 200 samples, and P is predicted at 100; ninefold away stays out
-        let said = |p: f32, human: f64| {
+        let prediction = |p: f32, human: f64| {
             let mut prediction = Prediction::by_threshold(&zone("A", 0, human, 1.0), 100.0);
             prediction.probabilities = vec![(100.0, p), (9.0 * human, 0.5)];
             prediction
         };
-        let quarter = [50.0, 200.0, 200.0, 200.0].map(|human| said(0.25, human));
-        let half = [50.0, 200.0].map(|human| said(0.75, human));
+        let quarter = [50.0, 200.0, 200.0, 200.0].map(|human| prediction(0.25, human));
+        let half = [50.0, 200.0].map(|human| prediction(0.75, human));
         let bins = reliability(quarter.iter().chain(&half));
         assert_eq!(bins.len(), 2);
         assert_eq!((bins[0].observed, bins[1].observed, bins[1].levels), (0.25, 0.5, 2));
@@ -126,8 +126,8 @@ mod tests {
     /// k = 3 in 1/27 of the drawings, so that the middle 90 % reach from k = 0 to k = 2.
     #[test]
     fn intervals_are_those_of_groups_drawn_again() {
-        let of = |scene: &str, spp: f64| Prediction::by_threshold(&zone(scene, 0, 100.0, 1.0), spp);
-        let three = [of("A", 100.0), of("B", 800.0), of("C", 100.0)];
+        let prediction = |scene: &str, spp: f64| Prediction::by_threshold(&zone(scene, 0, 100.0, 1.0), spp);
+        let three = [prediction("A", 100.0), prediction("B", 800.0), prediction("C", 100.0)];
         let group = |scene: &str| {
             if scene == "A" {
                 "A"

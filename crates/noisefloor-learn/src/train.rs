@@ -209,12 +209,12 @@ mod tests {
                 answers: vec![Answer { group: "scene0".into(), ..answer.clone() }; 3],
                 ..plain.clone()
             };
-            let of = |table: &Table| {
+            let predictions = |table: &Table| {
                 let all = leave_one_scene_out(table, &params, People::DEFAULT, |_| ()).unwrap();
                 all.into_iter().filter(|p| p.scene == "scene0").collect::<Vec<_>>()
             };
-            assert_eq!(of(&same), of(&plain));
-            assert_ne!(of(&told), of(&plain));
+            assert_eq!(predictions(&same), predictions(&plain));
+            assert_ne!(predictions(&told), predictions(&plain));
         }
         let short = Answer { group: "mine".into(), spp: 1.0, descriptor: vec![0.0], sees_noise: true };
         let error =

@@ -232,9 +232,9 @@ mod tests {
         let mut quest = QuestPlus::new(stack());
         for answer in [true, false, true, true] {
             let chosen = quest.next_level();
-            let of = |p: f64| -p * p.max(1e-300).ln();
+            let entropy_term = |p: f64| -p * p.max(1e-300).ln();
             let entropy = |q: &QuestPlus| -> f64 {
-                q.posterior.chunks(SCALES.len()).map(|of_one| of(of_one.iter().sum())).sum()
+                q.posterior.chunks(SCALES.len()).map(|of_one| entropy_term(of_one.iter().sum())).sum()
             };
             let expected = |level: u32| {
                 let p: f64 =

@@ -96,9 +96,9 @@ mod tests {
         #[test]
         fn luminances_beyond_the_table_are_those_at_its_ends(frequency in 0.05f64..200.0, by in 1.0f64..1e6) {
             for channel in [Achromatic, RedGreen, YellowViolet] {
-                let of = |luminance| contrast_sensitivity(channel, frequency, luminance);
-                prop_assert!((of(10_000.0 * by) / of(10_000.0) - 1.0).abs() < 1e-4);
-                prop_assert!((of(0.005 / by) / of(0.005) - 1.0).abs() < 1e-4);
+                let sensitivity = |luminance| contrast_sensitivity(channel, frequency, luminance);
+                prop_assert!((sensitivity(10_000.0 * by) / sensitivity(10_000.0) - 1.0).abs() < 1e-4);
+                prop_assert!((sensitivity(0.005 / by) / sensitivity(0.005) - 1.0).abs() < 1e-4);
             }
         }
     }

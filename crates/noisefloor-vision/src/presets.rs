@@ -144,13 +144,21 @@ mod tests {
 
     #[test]
     fn pixels_per_degree_of_recognised_presets() {
-        let of = |name| ViewingPreset::named(name).unwrap().viewing().pixels_per_degree();
+        let pixels_per_degree = |name| ViewingPreset::named(name).unwrap().viewing().pixels_per_degree();
         for (name, expected) in
             [("desk", 37.85), ("laptop", 55.56), ("tv", 165.1), ("phone", 120.6), ("cinema", 75.4)]
         {
-            assert!((of(name) - expected).abs() < 0.05 * expected / 10.0, "{name}: {}", of(name));
+            assert!(
+                (pixels_per_degree(name) - expected).abs() < 0.05 * expected / 10.0,
+                "{name}: {}",
+                pixels_per_degree(name)
+            );
         }
         // A screen that spans 110° along its diagonal has fewer pixels per degree in its centre than 2153/110
-        assert!((of("standard_hmd") - 13.16).abs() < 0.1, "{}", of("standard_hmd"));
+        assert!(
+            (pixels_per_degree("standard_hmd") - 13.16).abs() < 0.1,
+            "{}",
+            pixels_per_degree("standard_hmd")
+        );
     }
 }

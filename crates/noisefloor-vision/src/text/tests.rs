@@ -31,17 +31,17 @@ fn numbers_change_a_preset() {
 
 #[test]
 fn primaries_and_whites_are_read() {
-    let of = |text: &str| text.parse::<Viewing>().unwrap().params().primaries;
+    let primaries = |text: &str| text.parse::<Viewing>().unwrap().params().primaries;
     let measured = |white| Primaries::Measured(Chromaticities { white, ..Chromaticities::REC709 });
-    assert_eq!(of("desk,primaries=p3"), Primaries::Measured(Chromaticities::DISPLAY_P3));
+    assert_eq!(primaries("desk,primaries=p3"), Primaries::Measured(Chromaticities::DISPLAY_P3));
     for d50 in ["desk,white=d50", "white=d50,primaries=rec709", "desk,white=0.3457:0.3585"] {
-        assert_eq!(of(d50), measured(Chromaticities::D50), "{d50}");
+        assert_eq!(primaries(d50), measured(Chromaticities::D50), "{d50}");
     }
-    assert_eq!(of("white=8000K"), measured(Chromaticities::daylight(8000.0).unwrap()));
-    assert_eq!(of("white=0.333:0.333"), measured([0.333, 0.333]));
+    assert_eq!(primaries("white=8000K"), measured(Chromaticities::daylight(8000.0).unwrap()));
+    assert_eq!(primaries("white=0.333:0.333"), measured([0.333, 0.333]));
     // Presets keep their primaries, and their white
     let hdr = Chromaticities { white: Chromaticities::D93, ..Chromaticities::REC2020 };
-    assert_eq!(of("standard_hdr_pq,white=d93"), Primaries::Measured(hdr));
+    assert_eq!(primaries("standard_hdr_pq,white=d93"), Primaries::Measured(hdr));
     // Whatever says Rec.709 with D65 is the same as saying nothing
     for same in ["desk,white=d65", "desk,primaries=0.64:0.33:0.3:0.6:0.15:0.06", "white=0.3127:0.3290"] {
         assert_eq!(same.parse::<Viewing>().unwrap(), Viewing::default(), "{same}");
@@ -68,31 +68,31 @@ fn colours_are_written_by_name() {
 
 #[test]
 fn mistakes_are_named() {
-    let said = |text: &str| text.parse::<Viewing>().unwrap_err().to_string();
-    assert!(said("desc").contains("\"desc\""));
-    assert!(said("").contains("no viewing conditions"));
-    assert!(said("desk,ppi=3").contains("\"ppi\""));
-    assert!(said("desk,tv").contains("\"tv\""));
-    assert!(said("ppd=60,ppd=61").contains("twice"));
-    assert!(said("ppd=60,distance=1").contains("either ppd or"));
-    assert!(said("black=1,contrast=100").contains("either black or"));
-    assert!(said("peak=bright").contains("a number"));
-    assert!(said("resolution=0x10").contains("1920x1080"));
-    assert!(said("eotf=gammaX").contains("gamma2.2"));
-    assert!(said("ppd=nan").contains("1…2000"));
-    assert!(said("distance=0").contains("distance"));
-    assert!(said("contrast=0").contains("black"));
-    assert!(said("standard_hdr_hlg,ambient=0").contains("0.01 lux"));
+    let refusal = |text: &str| text.parse::<Viewing>().unwrap_err().to_string();
+    assert!(refusal("desc").contains("\"desc\""));
+    assert!(refusal("").contains("no viewing conditions"));
+    assert!(refusal("desk,ppi=3").contains("\"ppi\""));
+    assert!(refusal("desk,tv").contains("\"tv\""));
+    assert!(refusal("ppd=60,ppd=61").contains("twice"));
+    assert!(refusal("ppd=60,distance=1").contains("either ppd or"));
+    assert!(refusal("black=1,contrast=100").contains("either black or"));
+    assert!(refusal("peak=bright").contains("a number"));
+    assert!(refusal("resolution=0x10").contains("1920x1080"));
+    assert!(refusal("eotf=gammaX").contains("gamma2.2"));
+    assert!(refusal("ppd=nan").contains("1…2000"));
+    assert!(refusal("distance=0").contains("distance"));
+    assert!(refusal("contrast=0").contains("black"));
+    assert!(refusal("standard_hdr_hlg,ambient=0").contains("0.01 lux"));
     for primaries in ["p4", "0.64:0.33", "0.64:0.33:0.3:0.6:0.15:0.06:0.1", "::::::"] {
-        assert!(said(&format!("primaries={primaries}")).contains("rec2020, p3, or"));
+        assert!(refusal(&format!("primaries={primaries}")).contains("rec2020, p3, or"));
     }
     for white in ["d51", "3000K", "K", "nanK", "0.3", "0.3:0.3:0.4", "0.3,0.3"] {
-        assert!(said(&format!("white={white}")).contains("d50, d55"), "{white}");
+        assert!(refusal(&format!("white={white}")).contains("d50, d55"), "{white}");
     }
-    assert!(said("white=d50,white=d65").contains("twice"));
-    assert!(said("white=nan:0.3").contains("0.0001…1"));
-    assert!(said("white=0.6:0.6").contains("inside the triangle"));
-    assert!(said("primaries=0.3:0.6:0.64:0.33:0.15:0.06").contains("swapped"));
+    assert!(refusal("white=d50,white=d65").contains("twice"));
+    assert!(refusal("white=nan:0.3").contains("0.0001…1"));
+    assert!(refusal("white=0.6:0.6").contains("inside the triangle"));
+    assert!(refusal("primaries=0.3:0.6:0.64:0.33:0.15:0.06").contains("swapped"));
 }
 
 /// Those of a standard or nearby, with any white near the middle.

@@ -52,23 +52,23 @@ mod tests {
 
     #[test]
     fn one_seed_of_one_scene_is_dependent_whatever_else_differs() {
-        let of = |source: &str, options: &str, seed, repeats| SampleOrigin {
+        let origin = |source: &str, options: &str, seed, repeats| SampleOrigin {
             source: source.into(),
             options: options.into(),
             seed,
             repeats,
         };
-        let one = of("a", "x", 1, true);
+        let one = origin("a", "x", 1, true);
         let (nested, independent) = (Samples::Nested, Samples::Independent);
         for (other, relation) in [
-            (of("a", "x", 1, true), OriginRelation::Known(nested)),
-            (of("a", "x", 2, true), OriginRelation::Known(independent)),
-            (of("a", "y", 2, true), OriginRelation::Known(independent)),
-            (of("a", "y", 1, true), OriginRelation::Dependent),
-            (of("a", "x", 1, false), OriginRelation::Dependent),
-            (of("a", "x", 2, false), OriginRelation::Known(independent)),
-            (of("b", "x", 1, true), OriginRelation::Unknown),
-            (of("b", "x", 2, true), OriginRelation::Unknown),
+            (origin("a", "x", 1, true), OriginRelation::Known(nested)),
+            (origin("a", "x", 2, true), OriginRelation::Known(independent)),
+            (origin("a", "y", 2, true), OriginRelation::Known(independent)),
+            (origin("a", "y", 1, true), OriginRelation::Dependent),
+            (origin("a", "x", 1, false), OriginRelation::Dependent),
+            (origin("a", "x", 2, false), OriginRelation::Known(independent)),
+            (origin("b", "x", 1, true), OriginRelation::Unknown),
+            (origin("b", "x", 2, true), OriginRelation::Unknown),
         ] {
             assert_eq!(one.relation(&other), relation, "{other:?}");
             assert_eq!(other.relation(&one), relation, "{other:?}");

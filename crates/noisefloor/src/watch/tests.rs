@@ -450,7 +450,7 @@ fn tiles_that_were_mixed_up_do_not_fit() {
         let hills = 0.4 + 0.2 * (9.0 * x + 4.0 * y * y).sin() + 0.2 * (5.0 * y - 13.0 * x * x).cos();
         hills + if (x - 1.3 * y + 0.2).abs() < 0.06 { 1.0 } else { 0.0 }
     };
-    let said = |from: &dyn Fn(Tile, TileGrid, usize, usize) -> (usize, usize)| {
+    let warnings = |from: &dyn Fn(Tile, TileGrid, usize, usize) -> (usize, usize)| {
         let params = Params { tile: 32, max_spp: 1 << 30, min_spp: 0, ..Params::default() };
         let mut session = Session::new(EDGE, EDGE, FixedSpp(1 << 29), params).unwrap();
         let grid = session.film().grid();
@@ -466,15 +466,15 @@ fn tiles_that_were_mixed_up_do_not_fit() {
         session.warnings().to_vec()
     };
     let mixed_up = |how| vec![Warning::MixedUp(how)];
-    assert_eq!(said(&|t, _, x, y| (t.x + x, t.y + y)), []);
-    assert_eq!(said(&|t, _, x, y| (t.x + x, t.y + t.height - 1 - y)), mixed_up(UpsideDown));
-    assert_eq!(said(&|t, _, x, y| (t.x + x, EDGE - t.y - t.height + y)), mixed_up(UpsideDown));
-    assert_eq!(said(&|t, _, x, y| (t.x + t.width - 1 - x, t.y + y)), mixed_up(Mirrored));
-    assert_eq!(said(&|t, _, x, y| (t.x + y, t.y + x)), mixed_up(Transposed));
-    assert_eq!(said(&|t, _, x, y| (t.y + x, t.x + y)), mixed_up(Transposed));
+    assert_eq!(warnings(&|t, _, x, y| (t.x + x, t.y + y)), []);
+    assert_eq!(warnings(&|t, _, x, y| (t.x + x, t.y + t.height - 1 - y)), mixed_up(UpsideDown));
+    assert_eq!(warnings(&|t, _, x, y| (t.x + x, EDGE - t.y - t.height + y)), mixed_up(UpsideDown));
+    assert_eq!(warnings(&|t, _, x, y| (t.x + t.width - 1 - x, t.y + y)), mixed_up(Mirrored));
+    assert_eq!(warnings(&|t, _, x, y| (t.x + y, t.y + x)), mixed_up(Transposed));
+    assert_eq!(warnings(&|t, _, x, y| (t.y + x, t.x + y)), mixed_up(Transposed));
     let neighbour = |t: Tile, grid: TileGrid, by: usize| grid.tile((t.index + by) % grid.len());
     for by in [1, 8] {
-        let moved = said(&|t, grid, x, y| (neighbour(t, grid, by).x + x, neighbour(t, grid, by).y + y));
+        let moved = warnings(&|t, grid, x, y| (neighbour(t, grid, by).x + x, neighbour(t, grid, by).y + y));
         assert_eq!(moved, mixed_up(Shifted), "{by}");
     }
 }

@@ -98,18 +98,18 @@ fn read(out: &Path) -> anyhow::Result<Vec<KeyExposure>> {
 
 /// The exposure of the render in this folder, or of the sequence.
 pub fn exposure_of(folder: &Path) -> anyhow::Result<f32> {
-    let said = || format!("--exposure-from {}", folder.display());
-    match read(folder).with_context(said)?.as_slice() {
+    let option = || format!("--exposure-from {}", folder.display());
+    match read(folder).with_context(option)?.as_slice() {
         [] => {}
         [key] => return Ok(key.exposure),
-        _ => bail!("{}: that sequence has several exposures; name the folder of one frame", said()),
+        _ => bail!("{}: that sequence has several exposures; name the folder of one frame", option()),
     }
     let report = super::frames::read(folder);
     let report =
-        report.with_context(said).context("no report.json of a render is there, or it is damaged")?;
+        report.with_context(option).context("no report.json of a render is there, or it is damaged")?;
     report
         .exposure
-        .with_context(said)
+        .with_context(option)
         .context("that render has no exposure yet: let it come to its first verdict")
 }
 
@@ -120,16 +120,16 @@ mod tests {
     #[test]
     fn exposures_are_eased_by_factors() {
         let keys = [(3, 1.0), (5, 4.0), (8, 0.5)].map(|(frame, exposure)| KeyExposure { frame, exposure });
-        let of = |frame| eased(&keys, frame);
+        let exposure_at = |frame| eased(&keys, frame);
         assert_eq!(
-            [1, 2, 3, 5, 8, 9, 100].map(of),
+            [1, 2, 3, 5, 8, 9, 100].map(exposure_at),
             [Some(1.0), Some(1.0), None, None, None, Some(0.5), Some(0.5)]
         );
         for (frame, exposure) in [(4, 2.0), (6, 2.0), (7, 1.0)] {
             assert!(
-                of(frame).is_some_and(|found| (found - exposure).abs() < 1e-6),
+                exposure_at(frame).is_some_and(|found| (found - exposure).abs() < 1e-6),
                 "{frame}: {:?}",
-                of(frame)
+                exposure_at(frame)
             );
         }
         assert_eq!((eased(&keys[..1], 3), eased(&keys[..1], 7), eased(&[], 7)), (None, Some(1.0), None));

@@ -41,11 +41,11 @@ impl Span {
 
 /// Writes what the sequence will take, and says it.
 pub(super) fn say(frames: FrameRange, out: &Path, rows: &[FrameRow], quiet: bool) -> anyhow::Result<()> {
-    let of = |value: fn(&FrameRow) -> f64| {
+    let forecast = |value: fn(&FrameRow) -> f64| {
         let known: Vec<_> = rows.iter().map(|row| (row.frame, value(row))).collect();
         Forecast::of(frames, &known)
     };
-    let sums = of(|row| row.spp).zip(of(|row| row.seconds));
+    let sums = forecast(|row| row.spp).zip(forecast(|row| row.seconds));
     let (spp, seconds) =
         sums.ok_or_else(|| anyhow::anyhow!("too few frames were rendered for a forecast"))?;
     let known: Vec<u32> = rows.iter().map(|row| row.frame).collect();

@@ -186,8 +186,8 @@ impl Pictures {
                 Ok(Pair { size, pictures, spp: None })
             }
             Self::Program { command, most, seeds } => {
-                let one = |seed| command.render(each, *most, seed, part);
-                let (a, b) = (one(seeds[0])?, one(seeds[1])?);
+                let picture = |seed| command.render(each, *most, seed, part);
+                let (a, b) = (picture(seeds[0])?, picture(seeds[1])?);
                 if (a.width, a.height) != (b.width, b.height) {
                     bail!(
                         "the program wrote {}×{} and then {}×{} pixels",
