@@ -38,26 +38,27 @@ def name(scene):
 
 
 def jobs(args):
-    """What is rendered of a scene: folder and options."""
-    oidn = ["--denoise", "oidn"]
-    yield "oracle-denoised", oidn
-    yield "oracle-denoised-2", [*oidn, "--seed", "2"]
-    for spp in UNIFORM:
-        yield f"uniform-{spp}", [*oidn, "--min-spp", str(spp), "--max-spp", str(spp)]
-    yield "oracle", ["--max-spp", str(args.reference // 2)]
-    many = str(args.reference)
-    yield "reference", [*oidn, "--min-spp", many, "--max-spp", many, "--seed", "77"]
+    """What is rendered of a scene, folders and options: what each needs, and then what is good to have."""
+    oidn, many = ["--denoise", "oidn"], str(args.reference)
+    uniform = lambda spp: [*oidn, "--min-spp", str(spp), "--max-spp", str(spp)]
+    needed = {
+        "oracle-denoised": oidn,
+        **{f"uniform-{spp}": uniform(spp) for spp in UNIFORM},
+        "reference": [*uniform(many), "--seed", "77"],
+    }
+    more = {"oracle-denoised-2": [*oidn, "--seed", "2"], "oracle": ["--max-spp", str(args.reference // 2)]}
+    return needed, more
 
 
 def render(args):
-    for scene in args.scenes:
-        for job, options in jobs(args):
+    for part, scene in itertools.product((0, 1), args.scenes):
+        for job, options in jobs(args)[part].items():
             out = pathlib.Path(args.out) / name(scene) / job
             done = out / "processor-seconds.json"
             if done.exists():
                 continue
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            command = [args.noisefloor, "render", scene, "--size", args.size, "--tile", "64", "--seed", "1", "--out", str(out)]
+            command = [args.noisefloor, "render", scene, "--size", args.size, "--seed", "1", "--out", str(out)]
             if "--seed" in options:
                 del command[command.index("--seed"):command.index("--seed") + 2]
             if (out / "checkpoint.nfc").exists():

@@ -79,16 +79,20 @@ def render(addon, path, size, folder, reference=4096, seeds=2):
         done["search"] = {"user": used() - before, "found": found, "said": noisefloor_addon.hooks.state.summary}
         times.write_text(json.dumps(done, indent=1))
         print("search", done["search"], flush=True)
+    def some(chosen, seed):
+        for kind, value in chosen:
+            one(kind, value, seed)
+
+    # The dear ones last, so that an interrupted run has the others of both seeds
     for seed in range(1, seeds + 1):
         one("loop", 0, seed)
         if done["search"]["found"]:
             one("tuned", done["search"]["found"], seed)
-        for kind, value in THRESHOLDS:
-            one(kind, value, seed)
+        some(THRESHOLDS[:-1], seed)
     one("samples", reference, 77)
     for seed in range(1, seeds + 1):
-        for kind, value in SAMPLES:
-            one(kind, value, seed)
+        some(THRESHOLDS[-1:], seed)
+    some(SAMPLES, 1)
 
 
 def measure(folders):

@@ -29,6 +29,8 @@ pub const DEFAULT_JODS_LOST: f64 = 0.3;
 /// scenes, and tried in those of fourteen others (`docs/denoising.md`). An estimate errs both ways, and a tile stops where it
 /// errs to the low side.
 pub const ESTIMATE_ERRS_BY: f64 = 1.5;
+/// Edge of the square that a smaller tile is judged in, in pixels: as [`noisefloor::tune::squares`].
+const SQUARE: usize = 64;
 /// Contrasts between which an error is sought that is just allowed, and how well it is found.
 const CONTRASTS: (f64, f64) = (1.0 / 64.0, 8.0);
 const CONTRAST_TOLERANCE: f64 = 1.05;
@@ -37,7 +39,10 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 /// vision model.
 ///
 /// The two halves of the film are denoised apart, whole, and [`DenoisedError`] says how wrong the denoised
-/// picture is; the vision model says how many just-objectionable differences (JOD) each tile has lost by that.
+/// picture is; the vision model says how many just-objectionable differences (JOD) each tile has lost by that. A tile with
+/// a side of less than 64 pixels is also done when the square of 64 pixels around it is: the smaller the tiles, the
+/// fewer samples go to where nothing asks for them (`docs/benchmarks/tiles.md`).
+///
 /// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
 /// they are given. [`DenoisedRecord::compose`] shows such tiles as they were rendered.
 ///
@@ -217,13 +222,12 @@ impl Eyes<'_> {
 fn judge_tile(view: &View<'_>, error: &DenoisedError, tile: Tile, limit: f64, eyes: &mut Eyes<'_>) -> Judged {
     let (film, spp) = (view.film, view.film.spp(tile.index));
     let evidence = film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
-    let here = error.part(tile);
-    let lost = eyes.lost(&here, 1.0);
+    let (here, lost) = judged_by(error, tile, limit, eyes);
     if lost <= limit {
         return Judged { verdict: Verdict::new(evidence).expecting(Some(spp)), lost, undenoised: false };
     }
     // What a denoiser smears however many samples it gets is done when the noise is: no tile takes more samples denoised
-    let noise = noise_of(film, view.display, tile, here.shown().to_vec());
+    let noise = noise_of(film, view.display, tile, error.part(tile).shown().to_vec());
     let of_noise = eyes.lost(&noise, 1.0);
     if of_noise <= limit {
         let verdict = Verdict::new(evidence).expecting(Some(spp));
@@ -231,6 +235,29 @@ fn judge_tile(view: &View<'_>, error: &DenoisedError, tile: Tile, limit: f64, ey
     }
     let verdict = Verdict::new(false).expecting(eyes.needed_by_either([&here, &noise], limit, spp));
     Judged { verdict, lost, undenoised: false }
+}
+
+/// The part of the error that a tile is judged by, its own or the square around it, and what that has lost.
+fn judged_by(error: &DenoisedError, tile: Tile, limit: f64, eyes: &mut Eyes<'_>) -> (DenoisedError, f64) {
+    let own = error.part(tile);
+    let lost = eyes.lost(&own, 1.0);
+    let square = square_around(tile, error.size());
+    if lost <= limit || square.pixels() == tile.pixels() {
+        return (own, lost);
+    }
+    let around = error.part(square);
+    let lost_around = eyes.lost(&around, 1.0);
+    if lost_around < lost { (around, lost_around) } else { (own, lost) }
+}
+
+/// The tile, grown to [`SQUARE`] pixels where a side is shorter, within the picture.
+fn square_around(tile: Tile, (width, height): (usize, usize)) -> Tile {
+    let grown = |at: usize, edge: usize, side: usize| {
+        let wanted = edge.max(SQUARE.min(side));
+        ((at + edge / 2).saturating_sub(wanted / 2).min(side - wanted), wanted)
+    };
+    let ((x, width), (y, height)) = (grown(tile.x, tile.width, width), grown(tile.y, tile.height, height));
+    Tile { index: tile.index, x, y, width, height }
 }
 
 /// Samples per pixel, on average, that a picture would take without denoising until no tile has lost more than `limit`
@@ -278,9 +305,10 @@ pub fn spp_with_denoising(
     let tiles: Vec<Tile> = grid.tiles().collect();
     let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
         let mut eyes = Eyes { model: &model, room };
-        let here = error.part(tile);
-        let noise = noise_of(film, display, tile, here.shown().to_vec());
-        let spp = eyes.needed_by_either([&here, &noise], limit / ESTIMATE_ERRS_BY, film.spp(tile.index))?;
+        let limit = limit / ESTIMATE_ERRS_BY;
+        let (here, _) = judged_by(&error, tile, limit, &mut eyes);
+        let noise = noise_of(film, display, tile, error.part(tile).shown().to_vec());
+        let spp = eyes.needed_by_either([&here, &noise], limit, film.spp(tile.index))?;
         Some(spp as f64 * tile.pixels() as f64)
     });
     let samples: Option<Vec<f64>> = samples.collect();
@@ -295,4 +323,23 @@ fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Vec<f32>) -> Deno
         (inner.y..inner.y + inner.height).flat_map(|y| (inner.x..inner.x + inner.width).map(move |x| (y, x)));
     let noise = rows.map(|at| planes.residual[at]).collect();
     DenoisedError::of((tile.width, tile.height), shown, noise, display)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_tile_is_in_the_middle_of_its_square_and_at_an_edge_as_near_as_can_be() {
+        let around = |(x, y, width, height), size| {
+            let square = square_around(Tile { index: 7, x, y, width, height }, size);
+            (square.x, square.y, square.width, square.height)
+        };
+        assert_eq!(around((64, 96, 32, 32), (480, 270)), (48, 80, 64, 64));
+        assert_eq!(around((0, 256, 32, 14), (480, 270)), (0, 206, 64, 64));
+        assert_eq!(around((464, 0, 16, 16), (480, 270)), (416, 0, 64, 64));
+        // Larger tiles are judged by themselves, and so are pictures that are smaller than a square
+        assert_eq!(around((128, 0, 128, 128), (480, 270)), (128, 0, 128, 128));
+        assert_eq!(around((32, 0, 16, 30), (48, 30)), (0, 0, 48, 30));
+    }
 }

@@ -8,7 +8,8 @@ use noisefloor::{Rgb, TileGrid};
 pub struct DenoisedRecord {
     /// The error of the denoised picture at the last verdict.
     pub error: Option<DenoisedError>,
-    /// For each tile, the just-objectionable differences lost when it was last judged; NaN before that.
+    /// For each tile, the just-objectionable differences lost when it was last judged, by a small tile those of the square
+    /// around it where these are fewer; NaN before that.
     pub jods_lost: Vec<f64>,
     /// Tiles to be shown as rendered: their noise has lost no more than is allowed, and what the denoiser makes of them has.
     pub undenoised: Vec<bool>,

@@ -13,11 +13,15 @@ use std::sync::{Arc, Mutex};
 /// Deviation of one sample.
 const NOISE: f32 = 0.1;
 
-/// A session of the striped wall, until 2,000 spp at most.
+/// A session of the striped wall in tiles of 64, until 2,000 spp at most.
 fn session<D: Denoiser>(denoiser: D) -> Session<DenoisedQuality<D>> {
+    session_in_tiles(64, denoiser)
+}
+
+fn session_in_tiles<D: Denoiser>(edge: usize, denoiser: D) -> Session<DenoisedQuality<D>> {
     let criterion = DenoisedQuality::new(denoiser, 0.1);
     let params = Params::default()
-        .with_tile(64)
+        .with_tile(edge)
         .with_schedule(Schedule::Growing { step: 20 })
         .with_min_spp(20)
         .with_max_spp(2_000)
@@ -95,6 +99,37 @@ fn nineteen_of_twenty_tiles_that_stop_have_lost_no_more_than_is_allowed() {
     // Two standard deviations of a binomial distribution above one in twenty
     let expected = stopped as f64 / 20.0;
     assert!((more as f64) <= expected + 2.0 * (expected * 0.95).sqrt(), "{more} of {stopped}, worst {worst}");
+}
+
+/// Tiles that are smaller than squares of 64 pixels take fewer samples, and as few squares have lost too much.
+#[test]
+fn squares_keep_the_limit_in_small_tiles_too() {
+    let (mut squares, mut more, mut spp) = (0, 0, [0.0; 2]);
+    for seed in 1..=6 {
+        for (edge, spp) in [64, 32].into_iter().zip(&mut spp) {
+            let mut session = session_in_tiles(edge, Simple::Bilateral(0.1));
+            run_with(&mut session, seed).unwrap();
+            let film = session.film();
+            *spp += film.grid().tiles().map(|t| film.spp(t.index) as f64 * t.pixels() as f64).sum::<f64>();
+            if edge == 64 {
+                continue;
+            }
+            let rendered = session.film().image();
+            let mut denoised = Simple::Bilateral(0.1).of(&rendered);
+            let record = session.criterion().record();
+            record.lock().unwrap().compose(session.film().grid(), &rendered, &mut denoised);
+            let error = DenoisedError::known(SIZE, &denoised, &truth(), &session.display_so_far()).unwrap();
+            let (eyes, mut room) = (VisionModel::new(&session.params().viewing), VisionWorkspace::default());
+            for square in noisefloor::TileGrid::new(SIZE.0, SIZE.1, 64).unwrap().tiles() {
+                let lost = error.jods_lost(square, &eyes, &mut room).unwrap();
+                (squares, more) = (squares + 1, more + usize::from(lost > 0.1));
+            }
+        }
+    }
+    println!("{more} of {squares} have lost more; samples in tiles of 64 and of 32: {spp:?}");
+    let expected = squares as f64 / 20.0;
+    assert!((more as f64) <= expected + 2.0 * (expected * 0.95).sqrt(), "{more} of {squares}");
+    assert!(spp[1] <= spp[0], "{spp:?}");
 }
 
 /// A film of the striped wall with so many samples per pixel everywhere.

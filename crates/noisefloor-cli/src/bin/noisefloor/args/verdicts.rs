@@ -60,13 +60,10 @@ pub struct VerdictArgs {
     /// last.
     #[arg(long, default_value_t = 1, value_name = "K")]
     pub consecutive: u32,
-    /// Tile edge in pixels, 16…512; below 64, verdicts are less certain.
-    #[arg(
-        long,
-        default_value_t = TILE,
-        value_name = "PIXELS"
-    )]
-    pub tile: usize,
+    /// Tile edge in pixels, 16…512; below 64, verdicts on noise are less certain [default: 64; with --denoise 32 of the
+    /// built-in renderer].
+    #[arg(long, value_name = "PIXELS")]
+    pub tile: Option<usize>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -85,6 +82,8 @@ pub enum Preset {
 /// Windows are what is judged, whatever the tiles, and in smaller tiles fewer samples go where no window asks for them:
 /// tiles of 64 pixels take ×0.82 of what tiles of 128 take to the same worst window (docs/benchmarks/tiles.md).
 const TILE: usize = 64;
+/// Denoised pictures are judged by squares of 64 pixels. Many tiles cost other renderers much.
+const DENOISED_TILE: usize = 32;
 
 /// A quarter of the samples: twice the noise.
 const DRAFT: Audience = Audience { slope: 0.25, offset: 0.0 };
@@ -148,7 +147,7 @@ impl VerdictArgs {
         };
         let last = preset == Some(Preset::Final);
         let limits = Limits {
-            tile: self.tile,
+            tile: self.tile.unwrap_or(if denoise && renderer.is_built_in() { DENOISED_TILE } else { TILE }),
             schedule,
             min_spp: self.min_spp.unwrap_or(first.min(max_spp)),
             max_spp,
