@@ -259,6 +259,9 @@ typedef struct {
     uint32_t y;
     // A number that follows from the pictures, by which settings without effect are noticed; 0 if it is not known.
     uint64_t pictures;
+    // The noise of each picture, in a unit that is the same in all steps, by which thresholds are noticed that do not govern
+    // it; 0 if it is not known.
+    double noise;
 } NfExcess;
 
 #ifdef __cplusplus

@@ -54,6 +54,9 @@ pub struct NfExcess {
     pub y: u32,
     /// A number that follows from the pictures, by which settings without effect are noticed; 0 if it is not known.
     pub pictures: u64,
+    /// The noise of each picture, in a unit that is the same in all steps, by which thresholds are noticed that do not govern
+    /// it; 0 if it is not known.
+    pub noise: f64,
 }
 
 impl From<KnobError> for Failure {
@@ -110,9 +113,9 @@ pub unsafe extern "C" fn nf_tuning_next(tuning: *const NfTuning, step: *mut NfTu
 #[unsafe(no_mangle)]
 pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> NfStatus {
     guard(|| {
-        let NfExcess { ratio, x, y, pictures } = excess;
+        let NfExcess { ratio, x, y, pictures, noise } = excess;
         let place = Some((x as usize, y as usize));
-        let excess = Excess { place, pictures, ..Excess::new(ratio) };
+        let excess = Excess { place, pictures, noise, ..Excess::new(ratio) };
         handle::get(tuning)?.0.lock().unwrap_or_else(PoisonError::into_inner).tell(excess);
         Ok(())
     })
@@ -190,7 +193,7 @@ pub unsafe extern "C" fn nf_excess_denoised(
         let error = DenoisedError::new(&halves, compared.display()).map_err(|error| wrong(&error))?;
         let found = error.excess(lost, &params.viewing).map_err(|error| wrong(&error))?.worst;
         // SAFETY: promised by the caller.
-        unsafe { write(excess, Excess { pictures: pair.digest(), ..found }) }
+        unsafe { write(excess, pair.tell_apart(found)) }
     })
 }
 
@@ -234,8 +237,8 @@ unsafe fn pictures<const N: usize>(
 /// # Safety
 /// As [`border::write`].
 unsafe fn write(place: *mut NfExcess, excess: Excess) -> Result<(), Failure> {
-    let Excess { ratio, place: at, pictures } = excess;
+    let Excess { ratio, place: at, pictures, noise } = excess;
     let (x, y) = at.unwrap_or_default();
     // SAFETY: as for this function.
-    unsafe { border::write(place, NfExcess { ratio, x: x as u32, y: y as u32, pictures }, "excess") }
+    unsafe { border::write(place, NfExcess { ratio, x: x as u32, y: y as u32, pictures, noise }, "excess") }
 }

@@ -237,6 +237,6 @@ fn compare(
     let error = DenoisedError::new(&halves, compared.display()).map_err(|error| failed(&error))?;
     let found = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;
     let DenoisedExcess { worst, squares, map } = found;
-    let excess = Excess { pictures: pair.digest(), ..worst };
+    let excess = pair.tell_apart(worst);
     Ok(PyExcess { excess, size, map, squares })
 }

@@ -28,6 +28,7 @@ use crate::params::Params;
 use crate::rgb::Rgb;
 use crate::stills::{SnapshotPair, Still, StillError};
 use crate::tile::{Tile, TileError, TileGrid};
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// What is aimed at, as a share of what may be seen: an estimate that is a tenth too high does not cost
@@ -47,6 +48,12 @@ const BLIND_STEP: f64 = 8.0;
 /// So many finer settings in a row that give the same pictures are enough to say that no setting does otherwise. One is
 /// not: above some threshold, every pixel has the fewest samples that the renderer takes.
 const UNCHANGED: usize = 2;
+/// log(noise) over log(threshold) from which on a threshold is taken to govern the noise: one picture then has at most a tenth
+/// more of it than the mean of two. Where it does not, since pixels have the fewest samples that the renderer takes, one
+/// finer picture is not worth two coarse ones.
+const GOVERNS: f64 = 0.7;
+/// So many steps from the coarsest on may leave the noise as it is: then finer ones will, too.
+const UNGOVERNED: usize = 5;
 /// Below this slope, twice in a row, noise does not fall: twice the effort takes less than 4 % of it.
 const FLAT: f64 = 0.06;
 /// Steps are counted as evidence for that from this many times the effort on.
@@ -166,13 +173,16 @@ pub struct Excess {
     pub place: Option<(usize, usize)>,
     /// A number that follows from the pictures, the same for the same pictures; 0 if it is not known.
     pub pictures: u64,
+    /// The noise of each picture, in a unit that is the same in all steps; 0 if it is not known. By it, a search notices
+    /// thresholds that do not change the noise, and without it trusts that they do.
+    pub noise: f64,
 }
 
 impl Excess {
     /// From a ratio alone.
     pub fn new(ratio: f64) -> Self {
         let ratio = if ratio >= 0.0 { ratio } else { f64::INFINITY };
-        Self { ratio, place: None, pictures: 0 }
+        Self { ratio, place: None, pictures: 0, noise: 0.0 }
     }
 }
 
@@ -280,14 +290,39 @@ impl PicturePair {
         let worst = (0..map.len()).max_by(|&a, &b| map[a].total_cmp(&map[b]));
         let ratio = worst.map_or(0.0, |worst| f64::from(map[worst]));
         let place = worst.map(|worst| (worst % self.size().0, worst / self.size().0));
-        Ok((Excess { place, pictures: self.digest(), ..Excess::new(ratio) }, map))
+        Ok((self.tell_apart(Excess { place, ..Excess::new(ratio) }), map))
+    }
+
+    /// An excess of these pictures, with what tells them from those of other settings: [`Excess::pictures`] and
+    /// [`Excess::noise`].
+    pub fn tell_apart(&self, excess: Excess) -> Excess {
+        Excess { pictures: self.digest(), noise: self.noise_of_each(), ..excess }
     }
 
     /// A number that follows from the pictures (FNV-1a); not 0.
-    pub fn digest(&self) -> u64 {
+    fn digest(&self) -> u64 {
         let bits = self.one.pixels.iter().flatten().map(|c| u64::from(c.to_bits()));
         let step = |hash: u64, bits: u64| (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3);
         bits.fold(0xcbf2_9ce4_8422_2325, step).max(1)
+    }
+
+    /// How much noise each picture has in its noisiest squares: the mean difference from the mean of both, relative to how
+    /// bright it is there, of which a tenth of the [`squares`] have more. A mean over so many pixels tells a few
+    /// percent apart, which the worst place does not.
+    fn noise_of_each(&self) -> f64 {
+        let (mean, one) = (&self.mean.pixels, &self.one.pixels);
+        let level = mean.as_flattened().iter().map(|&c| f64::from(c.abs())).sum::<f64>();
+        let level = (level / (3 * mean.len()) as f64).max(f64::MIN_POSITIVE);
+        let of_pixel = |pixel: usize| -> f64 {
+            let channels = mean[pixel].into_iter().zip(one[pixel]).map(|(a, b)| (f64::from(a), f64::from(b)));
+            channels.map(|(mean, one)| (one - mean).abs() / (mean.abs() + level)).sum()
+        };
+        let of_square = |square: Tile| {
+            square.rows(self.size().0).flatten().map(of_pixel).sum::<f64>() / square.pixels() as f64
+        };
+        let mut all: Vec<f64> = squares(self.size()).into_par_iter().map(of_square).collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() - 1 - all.len() / 10]
     }
 }
 
@@ -381,8 +416,10 @@ impl Tuning {
     /// The setting to try, or how it ended. The same until [`Tuning::tell`].
     pub fn next(&self) -> Next {
         let Some(last) = self.steps.last() else { return self.render(self.knob.coarsest()) };
-        if last.excess.ratio <= 1.0 {
-            return Next::Done(self.found(last));
+        if last.excess.ratio <= 1.0
+            && let Some(ending) = self.found(last)
+        {
+            return Next::Done(ending);
         }
         let alike = self.steps.iter().rev().take_while(|step| step.draws_as(last)).count();
         if alike > UNCHANGED {
@@ -392,10 +429,18 @@ impl Tuning {
         if last.setting == self.knob.finest() {
             return Next::Done(Ending::AtFinest { ratio });
         }
-        if self.is_flat() {
+        let at_fewest = self.is_at_fewest(last);
+        if self.is_flat() && !(at_fewest && self.steps.len() < UNGOVERNED) {
             return Next::Done(Ending::NotFalling { ratio });
         }
-        let more = if alike > 1 { BLIND_STEP } else { self.step_from(last) };
+        let more = if alike > 1 || at_fewest {
+            BLIND_STEP
+        } else if ratio <= 1.0 {
+            // Whether one picture is as good as both: by two of it
+            self.knob.effort(last.setting) / self.knob.effort(last.each)
+        } else {
+            self.step_from(last)
+        };
         let next = self.knob.setting(self.knob.effort(last.setting) * more);
         // Rounding must not stand still
         self.render(if next == last.setting { self.knob.finest() } else { next })
@@ -441,23 +486,64 @@ impl Tuning {
         flat(last_two.next()) && flat(last_two.next())
     }
 
-    fn found(&self, last: &Step) -> Ending {
-        let too_coarse = self.steps.iter().rev().nth(1);
+    /// log(noise) over log(threshold) between the last two steps; `None` without two whose noise is known.
+    fn governed(&self, last: &Step) -> Option<f64> {
+        let before = self.steps.iter().rev().nth(1)?;
+        let noise = before.excess.noise / last.excess.noise;
+        let exponent = noise.ln() / (before.each / last.each).ln();
+        (exponent.is_finite() && noise > 0.0).then_some(exponent)
+    }
+
+    /// Whether no threshold so far has changed the noise: all pixels may have the fewest samples that the renderer takes.
+    fn is_at_fewest(&self, last: &Step) -> bool {
+        let ungoverned = |first: &Step| {
+            let fell = first.excess.noise / last.excess.noise;
+            fell.is_finite() && fell.ln() < GOVERNS * (first.each / last.each).ln()
+        };
+        self.steps.len() > 1 && self.steps.first().is_some_and(ungoverned)
+    }
+
+    /// What is claimed if the mean of the last two pictures passes; `None` if one picture with a finer threshold may be worse.
+    fn found(&self, last: &Step) -> Option<Ending> {
+        let coarser = self.steps.iter().rev().nth(1);
+        let threshold = matches!(self.knob, Knob::Threshold { .. });
+        let governs = match self.governed(last) {
+            Some(exponent) => exponent >= GOVERNS,
+            None => last.excess.noise == 0.0 || coarser.is_some_and(|step| step.excess.noise == 0.0),
+        };
+        if threshold && !governs {
+            // One of the two is worse than their mean, by the root of two at the most
+            let single = last.excess.ratio * std::f64::consts::SQRT_2 <= 1.0;
+            let setting = self.knob.setting(self.knob.effort(last.each));
+            let too_coarse = coarser.filter(|step| step.excess.ratio > 1.0).map(|step| step.setting);
+            let done = single || last.setting == self.knob.finest();
+            return done.then_some(Ending::Found { setting, enough: setting, too_coarse });
+        }
+        Some(self.between(last))
+    }
+
+    fn between(&self, last: &Step) -> Ending {
+        let coarser = self.steps.iter().rev().nth(1);
         let enough = last.setting;
         let between = |before: &Step| {
             let [a, b] = [before, last].map(|step| step.excess.ratio.ln());
             let [from, to] = [before, last].map(|step| self.knob.effort(step.setting).ln());
-            // Where the line between both meets what is aimed at
+            // Where the line between both meets what is aimed at; if only part of the way went by the threshold, noise
+            // rises again from the last one as noise does
             let share = ((a - AIM.ln()) / (a - b)).clamp(0.0, 1.0);
-            let setting = self.knob.setting((from + share * (to - from)).exp());
+            let as_noise = to - (AIM.ln() - b) / NOISE;
+            let chord = from + share * (to - from);
+            let setting =
+                self.knob.setting(if last.excess.noise > 0.0 { chord.max(as_noise) } else { chord }.exp());
             // Nothing is claimed outside of what was tried
             setting.clamp(enough.min(before.setting), enough.max(before.setting))
         };
-        let setting = match too_coarse {
+        let setting = match coarser {
             Some(before) if last.excess.ratio < AIM && before.excess.ratio.is_finite() => between(before),
             _ => enough,
         };
-        Ending::Found { setting, enough, too_coarse: too_coarse.map(|step| step.setting) }
+        let too_coarse = coarser.filter(|step| step.excess.ratio > 1.0).map(|step| step.setting);
+        Ending::Found { setting, enough, too_coarse }
     }
 }
 
@@ -543,6 +629,53 @@ mod tests {
         ] {
             assert!(Tuning::new(knob).is_err(), "{knob:?}");
         }
+    }
+
+    /// Pictures of a renderer that takes `fewest` samples at least, where 1/t² are enough for a threshold t, in the unit of
+    /// the samples that are needed.
+    fn with_fewest(fewest: f64, needed: f64) -> impl Fn(f64) -> Excess {
+        move |setting| {
+            let each = THRESHOLD.of_each(setting).powi(-2).max(fewest);
+            Excess { noise: each.powf(-0.5), ..Excess::new((needed / (2.0 * each)).sqrt()) }
+        }
+    }
+
+    /// Two pictures of the fewest samples are worth one of twice as many, but no coarse threshold renders that.
+    #[test]
+    fn one_picture_with_the_setting_found_is_enough_whatever_the_fewest_samples() {
+        for fewest in [1.0, 60.0, 400.0, 2_000.0, 9_000.0] {
+            for needed in [30.0, 110.0, 500.0, 700.0, 3_000.0, 15_000.0] {
+                let (ending, steps) = search(THRESHOLD, with_fewest(fewest, needed));
+                let Ending::Found { setting, enough, too_coarse } = ending else { panic!("{ending:?}") };
+                let samples = |setting: f64| f64::max(setting.powi(-2), fewest);
+                assert!(samples(setting) >= 0.99 * needed, "{setting} for {fewest}, {needed}: {steps:?}");
+                // And it is not much finer than it must be, but where the fewest are about enough
+                let most =
+                    if fewest > needed / 4.0 { 4.2 * fewest.max(needed) } else { 1.7 * needed.max(100.0) };
+                assert!(samples(setting) <= most, "{setting} for {fewest}, {needed}: {steps:?}");
+                assert!(enough <= setting && too_coarse.is_none_or(|coarse| coarse >= setting));
+                assert!(steps.len() <= 6, "{steps:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_noise_of_pictures_is_in_proportion_and_well_known() {
+        let noise = |seed, sigma| {
+            let pair =
+                PicturePair::new((256, 256), [noisy(seed, sigma), noisy(seed + 1, sigma)], 64.0).unwrap();
+            let told = pair.tell_apart(Excess::new(1.0));
+            assert!(told.pictures != 0 && told.ratio == 1.0);
+            told.noise
+        };
+        let [one, half, again] = [noise(1, 0.02), noise(3, 0.01), noise(5, 0.02)];
+        assert!(
+            (one / half / 2.0 - 1.0).abs() < 0.05 && (one / again - 1.0).abs() < 0.05,
+            "{one} {half} {again}"
+        );
+        // Of a normal deviation σ, |a − b|/2 is σ/√π on average; three times as much where it is worst
+        let expected = 3.0 * 3.0 * 0.02 / std::f64::consts::PI.sqrt() / (0.4 + 0.4);
+        assert!((one / expected - 1.0).abs() < 0.05, "{one} {expected}");
     }
 
     /// A grey picture of this noise, in which one quarter has three times as much.

@@ -74,6 +74,9 @@ struct Row {
     y: Option<usize>,
     /// Follows from the pictures, so that equal ones are known ([`Excess::pictures`]).
     pictures: u64,
+    /// Of each picture ([`Excess::noise`]).
+    #[serde(default)]
+    noise: f64,
     /// For both pictures, and what judging them took.
     seconds: f64,
     judging_seconds: f64,
@@ -224,6 +227,8 @@ impl<'a> Search<'a> {
         found.sort_by(|(_, a), (_, b)| b.excess.ratio.total_cmp(&a.excess.ratio));
         let worst = found[0].0;
         let frame = self.views[self.places[worst].view].frame;
+        // The noise of another place says nothing of the setting
+        let comparable = worst == 0 && (self.rows.len() != 1 || job.regions == 0);
         if !self.rows.is_empty() {
             self.places[..=worst].rotate_right(1);
         } else if job.regions > 0 {
@@ -234,9 +239,12 @@ impl<'a> Search<'a> {
                 .map(|(number, _)| Place { view: self.places[*number].view, crop: None })
                 .collect();
         }
-        let (_, worst) = found.swap_remove(0);
+        let (_, mut worst) = found.swap_remove(0);
+        if !comparable && !self.rows.is_empty() {
+            worst.excess.noise = 0.0;
+        }
         self.tuning.tell(worst.excess);
-        let Excess { ratio, place, pictures } = worst.excess;
+        let Excess { ratio, place, pictures, noise } = worst.excess;
         let row = Row {
             setting,
             each,
@@ -245,6 +253,7 @@ impl<'a> Search<'a> {
             x: place.map(|(x, _)| x),
             y: place.map(|(_, y)| y),
             pictures,
+            noise,
             seconds: rendering.as_secs_f64(),
             judging_seconds: judging.as_secs_f64(),
         };
@@ -319,7 +328,8 @@ impl<'a> Search<'a> {
 impl Row {
     fn excess(&self) -> Excess {
         let ratio = self.ratio.unwrap_or(f64::INFINITY);
-        Excess { place: self.x.zip(self.y), pictures: self.pictures, ..Excess::new(ratio) }
+        let (place, pictures, noise) = (self.x.zip(self.y), self.pictures, self.noise);
+        Excess { place, pictures, noise, ..Excess::new(ratio) }
     }
 }
 
@@ -368,8 +378,13 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
     }
     let name = name(job.tuning.knob());
     match ending {
-        Ending::Found { setting, enough, too_coarse: None } => {
+        Ending::Found { setting, enough, too_coarse: None }
+            if report.steps.first().is_some_and(|step| step.setting == setting) =>
+        {
             say!("{name} {setting}: the coarsest tried, and {enough} is enough; --from tries coarser ones")?
+        }
+        Ending::Found { setting, too_coarse: None, .. } => {
+            say!("{name} {setting}: enough in one picture; of coarser ones, it takes two together")?;
         }
         Ending::Found { setting, enough, too_coarse: Some(coarse) } if setting == enough => {
             say!("{name} {setting}; {coarse} is too coarse")?;

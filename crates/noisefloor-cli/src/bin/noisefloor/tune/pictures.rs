@@ -356,7 +356,7 @@ impl<'a> Judges<'a> {
                 let error =
                     DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
                 let DenoisedExcess { worst, squares, map } = error.excess(*lost, &params.viewing)?;
-                let excess = in_whole(Excess { pictures: halves.digest(), ..worst });
+                let excess = in_whole(halves.tell_apart(worst));
                 let denoised = Some(denoiser.denoise(&guided(&mean, 0))?);
                 Ok(Judged { excess, size, mean, denoised, display, map, squares, spp })
             }
