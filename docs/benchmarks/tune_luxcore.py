@@ -20,7 +20,7 @@ import pyluxcore
 
 THRESHOLDS = (0.2, 0.1, 10 / 256, 5 / 256, 0.01)
 SAMPLES = (64, 256, 512)
-MOST = 4096
+MOST = 1024
 
 scene, size, folder, noisefloor, *more = sys.argv[1:]
 reference = int(more[0]) if more else 4096
