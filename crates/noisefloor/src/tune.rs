@@ -515,7 +515,7 @@ impl Tuning {
             // One of the two is worse than their mean, by the root of two at the most
             let single = last.excess.ratio * std::f64::consts::SQRT_2 <= 1.0;
             let setting = self.knob.setting(self.knob.effort(last.each));
-            let too_coarse = coarser.filter(|step| step.excess.ratio > 1.0).map(|step| step.setting);
+            let too_coarse = coarser.filter(|step| step.excess.ratio > 1.0).map(|step| step.each);
             let done = single || last.setting == self.knob.finest();
             return done.then_some(Ending::Found { setting, enough: setting, too_coarse });
         }

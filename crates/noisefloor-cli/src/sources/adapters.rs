@@ -16,8 +16,8 @@ pub struct Adapter {
     open: fn(&Job) -> Result<Sidecar, SidecarError>,
     /// Samples per pixel between verdicts, at the least.
     pub step: u64,
-    /// Whether it has a noise threshold of its own, and samples where the noise is above it.
-    pub adapts: bool,
+    /// The coarsest of its own noise thresholds that is worth trying; none if it does not sample where noise is above one.
+    pub threshold: Option<f64>,
     /// Whether it renders a part of such a picture as it is in the whole.
     pub crops: bool,
     /// What keeps it from being all it could be here, and what mends that.
@@ -31,7 +31,7 @@ pub const ADAPTERS: &[Adapter] = &[
         renderer: &noisefloor_mitsuba::RENDERER,
         open: noisefloor_mitsuba::open,
         step: Schedule::STEP,
-        adapts: false,
+        threshold: None,
         crops: false,
         notes: noisefloor_mitsuba::notes,
     },
@@ -43,7 +43,7 @@ pub const ADAPTERS: &[Adapter] = &[
     },
     // A chain has no pixels of its own
     Adapter {
-        adapts: false,
+        threshold: None,
         crops: false,
         ..luxcore("luxcore-metropolis", |job| {
             noisefloor_luxcore::open(job, Engine::Path, Sampler::Metropolis)
@@ -56,7 +56,7 @@ pub const ADAPTERS: &[Adapter] = &[
         open: noisefloor_cycles::open,
         // Each call costs it a start
         step: 32,
-        adapts: true,
+        threshold: Some(0.2),
         crops: true,
         notes: Vec::new,
     },
@@ -64,7 +64,9 @@ pub const ADAPTERS: &[Adapter] = &[
 
 const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarError>) -> Adapter {
     let (renderer, step) = (&noisefloor_luxcore::RENDERER, Schedule::STEP);
-    Adapter { name, renderer, open, step, adapts: true, crops: false, notes: Vec::new }
+    // Its own default, 10/256: coarser ones stop at its first looks, whose number depends on how busy the machine is
+    let threshold = Some(0.04);
+    Adapter { name, renderer, open, step, threshold, crops: false, notes: Vec::new }
 }
 
 /// An adapter by its name: its functions have other addresses in every run.

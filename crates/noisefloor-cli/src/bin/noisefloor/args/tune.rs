@@ -50,7 +50,7 @@ pub struct TuneArgs {
     /// What is sought [default: the noise threshold, where the renderer has one].
     #[arg(long, value_enum)]
     knob: Option<KnobChoice>,
-    /// Where the search begins: the coarsest threshold, or the fewest samples [default: 0.2, or 16].
+    /// Where the search begins: the coarsest threshold, or the fewest samples [default: 0.2, 0.04 of LuxCore, or 16].
     #[arg(long, value_name = "SETTING")]
     from: Option<f64>,
     /// Where it ends: the finest threshold, or the most samples [default: 0.001, or 16384].
@@ -119,12 +119,13 @@ impl TuneArgs {
                 refuse!("--frames names frame {} twice", pair[0]);
             }
         }
-        let (adapts, name) = match &source.kind {
-            SourceKind::Adapter(adapter) => (adapter.adapts, adapter.name),
-            SourceKind::Command(template) => (template.contains("{threshold}"), "command"),
-            SourceKind::Ptwne(_) => (false, "ptwne"),
+        let (coarsest, name) = match &source.kind {
+            SourceKind::Adapter(adapter) => (adapter.threshold, adapter.name),
+            SourceKind::Command(template) => (template.contains("{threshold}").then_some(0.2), "command"),
+            SourceKind::Ptwne(_) => (None, "ptwne"),
             SourceKind::Exr => refuse!("--source exr plays back pictures, and has no setting to find"),
         };
+        let adapts = coarsest.is_some();
         let choice = self.knob.unwrap_or(if adapts { KnobChoice::Threshold } else { KnobChoice::Samples });
         match (choice, &source.kind, adapts) {
             (KnobChoice::Threshold, SourceKind::Command(_), false) => {
@@ -164,9 +165,10 @@ impl TuneArgs {
             }
         };
         let knob = match choice {
-            KnobChoice::Threshold => {
-                Knob::Threshold { coarsest: self.from.unwrap_or(0.2), finest: self.to.unwrap_or(0.001) }
-            }
+            KnobChoice::Threshold => Knob::Threshold {
+                coarsest: self.from.or(coarsest).unwrap_or(0.2),
+                finest: self.to.unwrap_or(0.001),
+            },
             KnobChoice::Samples => Knob::Samples {
                 least: whole("--from", self.from, 16)?,
                 most: whole("--to", self.to, 16_384)?,
