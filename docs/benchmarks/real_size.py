@@ -5,6 +5,7 @@
     real_size.py measure OUT > rows.csv  JOD lost by the worst square of 64 pixels, by `noisefloor metrics`
     real_size.py package OUT SCENE       the same of one scene by the PyPI package cvvdp, no code of this project
     real_size.py table rows.csv          the tables of real-size.md
+    real_size.py plot rows.csv OUT.svg   error against samples, of the denoised pictures; needs matplotlib
 
 Each scene is rendered by the built-in path tracer: until the oracle stops all tiles, noisy and denoised; with one number of
 samples for all pixels, which are denoised, too; and once with far more samples and another seed, as the reference. Its own
@@ -172,11 +173,46 @@ def table(args):
                 print(f"\nby {by}: median of the {len(found)} that are bracketed ×{np.median(found):.2f}, lowest ×{min(found):.2f}")
 
 
+def plot(args):
+    import matplotlib
+    matplotlib.use("svg")
+    # Text as text, and the same file for the same rows
+    matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "noisefloor", "font.size": 9})
+    from matplotlib import pyplot
+
+    scenes = {}
+    for row in csv.DictReader(open(args.rows)):
+        scenes.setdefault(row["scene"], []).append(row)
+    across = 3
+    figure, panels = pyplot.subplots(-(-len(scenes) // across), across, figsize=(9, 2.6 * -(-len(scenes) // across)), squeeze=False)
+    for panel, (scene, rows) in itertools.zip_longest(panels.flat, scenes.items(), fillvalue=(None, [])):
+        if scene is None:
+            panel.axis("off")
+            continue
+        uniform = [row for row in rows if row["picture"].startswith("uniform-") and row["picture"].endswith("-denoised")]
+        uniform.sort(key=lambda row: float(row["spp"]))
+        ours = [row for row in rows if row["picture"] in ("oracle-denoised", "oracle-denoised-2")]
+        for key, colour in (("worst_denoised", "#c0392b"), ("median_denoised", "#2c7fb8")):
+            at = lambda rows: ([float(row["spp"]) for row in rows], [float(row[key]) for row in rows])
+            panel.plot(*at(uniform), "-", color=colour, marker=".", linewidth=1)
+            panel.plot(*at(ours), "o", color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6)
+        panel.axhline(0.3, color="grey", linewidth=0.7, linestyle=":")
+        panel.set(xscale="log", yscale="log", title=scene, ylim=(0.04, 2.5))
+        panel.set_yticks([0.1, 0.3, 1.0], ["0.1", "0.3", "1"])
+        panel.minorticks_off()
+        ticks = [t for t in (30, 100, 300, 1000) if panel.get_xlim()[0] <= t <= panel.get_xlim()[1]]
+        panel.set_xticks(ticks, [str(t) for t in ticks])
+    figure.supxlabel("samples per pixel, on average")
+    figure.supylabel("JOD lost")
+    figure.tight_layout()
+    figure.savefig(args.out, metadata={"Date": None})
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--noisefloor", default="target/release/noisefloor")
     commands = parser.add_subparsers(required=True)
-    for command, words in {render: ["out", "scenes"], measure: ["out"], package: ["out", "scene"], table: ["rows"]}.items():
+    for command, words in {render: ["out", "scenes"], measure: ["out"], package: ["out", "scene"], table: ["rows"], plot: ["rows", "out"]}.items():
         sub = commands.add_parser(command.__name__)
         sub.set_defaults(run=command)
         for word in words:
