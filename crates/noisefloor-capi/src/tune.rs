@@ -161,7 +161,8 @@ pub unsafe extern "C" fn nf_excess(
 
 /// As nf_excess, for pictures that are denoised: denoised_a is what a denoiser makes of a, and denoised_b of b, each
 /// without a look at the other. The ratio is that of the just-objectionable differences (JOD) that the worst square of
-/// 64 pixels has lost to lost, 0.3 say. Nobody has been asked about denoised pictures: the limit is a vision model's.
+/// 64 pixels may have lost, 1.5 times the estimate, to lost, 0.3 say. Nobody has been asked about denoised pictures: the limit
+/// is a vision model's.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_excess_denoised(
     lost: f64,

@@ -24,6 +24,7 @@
 
 use crate::bands::Plane;
 use crate::brightness::{Light, jods_of_edge, shift};
+use crate::criterion::ESTIMATE_ERRS_BY;
 use crate::denoiser::DenoiseError;
 use noisefloor::tune::{Excess, squares};
 use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes};
@@ -70,7 +71,7 @@ pub struct DenoisedError {
 pub struct DenoisedExcess {
     /// In its worst square.
     pub worst: Excess,
-    /// In each of its [`squares`]: what is lost there over what may be lost.
+    /// In each of its [`squares`]: what may be lost there, with the margin, over what is allowed.
     pub squares: Vec<(Tile, f64)>,
     /// JODs lost around each pixel, row-major.
     pub map: Vec<f32>,
@@ -166,14 +167,16 @@ impl DenoisedError {
         self.part(tile).jods_lost_at(1.0, eyes, room)
     }
 
-    /// How far the worst of the picture's [`squares`] is from having lost `lost` JODs.
+    /// How far the worst of the picture's [`squares`] is from having lost `lost` JODs, with the margin of
+    /// [`ESTIMATE_ERRS_BY`]: where the ratio is 1, two thirds of that are estimated.
     ///
     /// # Errors
     /// [`VisionError`] if a side of the picture has less than two pixels.
     pub fn excess(&self, lost: f64, viewing: &Viewing) -> Result<DenoisedExcess, VisionError> {
         let eyes = VisionModel::new(viewing);
         let ratio = |room: &mut VisionWorkspace, square: Tile| {
-            Ok((square, self.jods_lost(Tile { index: 0, ..square }, &eyes, room)? / lost))
+            let estimated = self.jods_lost(Tile { index: 0, ..square }, &eyes, room)?;
+            Ok((square, estimated * ESTIMATE_ERRS_BY / lost))
         };
         let all = squares(self.size).into_par_iter().map_init(VisionWorkspace::default, ratio);
         let squares: Vec<(Tile, f64)> = all.collect::<Result<_, _>>()?;

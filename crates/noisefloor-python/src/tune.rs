@@ -174,8 +174,8 @@ enum ExcessLike<'py> {
 /// oracle: an Oracle; None is Oracle(). params: display and audience; None is Params(). Windows are judged, whatever the
 ///     tile.
 /// denoised: what a denoiser makes of a and of b, each without a look at the other. Then the ratio is that of the
-///     just-objectionable differences (JOD) that the worst square of 64 pixels has lost to lost; nobody has been asked
-///     about denoised pictures.
+///     just-objectionable differences (JOD) that the worst square of 64 pixels may have lost, 1.5 times the estimate, to
+///     lost; nobody has been asked about denoised pictures.
 /// spp: samples per pixel of each, for an audience that is no factor.
 ///
 /// The interpreter's lock is released.

@@ -353,7 +353,7 @@ fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
             format!("{} of people see none: {ratio:.2} of what they do not see", oracle.people())
         }
         (TuneCriterion::Denoised { lost }, Some(ratio)) => {
-            format!("the denoised picture has lost {:.3} JOD, {lost} are allowed", ratio * lost)
+            format!("the denoised picture may have lost {:.3} JOD, {lost} are allowed", ratio * lost)
         }
     };
     let mut at = match (row.x, row.y) {
