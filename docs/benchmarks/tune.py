@@ -120,6 +120,8 @@ def measure(folders):
                     picture = read(path)
                     squares = [(slice(y, y + 64), slice(x, x + 64)) for y in places(picture.shape[0]) for x in places(picture.shape[1])]
                     lost.append(max(10 - float(metric.predict(picture[s], reference[s], dim_order="HWC")[0]) for s in squares))
+            if not lost:
+                continue
             seconds = numpy.mean([done[f"{name}-{seed}"]["user"] for seed in (1, 2) if f"{name}-{seed}" in done])
             print(f"| {name} | {seconds:.1f} | {numpy.mean(lost):.2f} | {max(lost):.2f} |", flush=True)
 
