@@ -500,7 +500,9 @@ impl Tuning {
             let fell = first.excess.noise / last.excess.noise;
             fell.is_finite() && fell.ln() < GOVERNS * (first.each / last.each).ln()
         };
-        self.steps.len() > 1 && self.steps.first().is_some_and(ungoverned)
+        // Unknown noise, of another frame or crop, may lie in between
+        let known = self.steps.iter().all(|step| step.excess.noise > 0.0);
+        known && self.steps.len() > 1 && self.steps.first().is_some_and(ungoverned)
     }
 
     /// What is claimed if the mean of the last two pictures passes; `None` if one picture with a finer threshold may be worse.
@@ -638,6 +640,18 @@ mod tests {
             let each = THRESHOLD.of_each(setting).powi(-2).max(fewest);
             Excess { noise: each.powf(-0.5), ..Excess::new((needed / (2.0 * each)).sqrt()) }
         }
+    }
+
+    /// Noise of other frames or crops, which is marked as unknown, says nothing of the fewest samples.
+    #[test]
+    fn noise_that_is_unknown_in_between_makes_no_leap() {
+        let mut tuning = Tuning::new(THRESHOLD).unwrap();
+        for (ratio, noise) in [(8.0, 0.01), (2.68, 0.0), (1.1, 0.2)] {
+            tuning.tell(Excess { noise, ..Excess::new(ratio) });
+        }
+        let Next::Render { setting, .. } = tuning.next() else { panic!("{:?}", tuning.next()) };
+        let times = THRESHOLD.effort(setting) / THRESHOLD.effort(tuning.steps()[2].setting);
+        assert!(times < 3.0, "{times} after {:?}", tuning.steps());
     }
 
     /// Two pictures of the fewest samples are worth one of twice as many, but no coarse threshold renders that.
