@@ -59,7 +59,7 @@ mod _noisefloor {
     #[pymodule_export]
     use crate::tone::{PyLut, PyToneTable};
     #[pymodule_export]
-    use crate::tune::{PyExcess, PyTuning, excess};
+    use crate::tune::{PyExcess, PyLook, PySearch, PyTuning, excess};
     #[pymodule_export]
     use crate::verdicts::{PyRequest, PyStop, PyTile, PyVerdict};
     use pyo3::prelude::*;

@@ -5,7 +5,9 @@ use crate::errors::{CriterionError, ParameterError, PictureError, Raise, SizeErr
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
-use noisefloor::tune::{Ending, Excess, Knob, Next, PairError, PicturePair, Tuning, most_in_squares};
+use noisefloor::tune::{
+    Ending, Excess, Knob, Look, Next, PairError, PicturePair, Search, Tuning, crops_for, most_in_squares,
+};
 use noisefloor::{Oracle, Params, Rgb, Tile};
 use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedExcess, DenoisedHalves};
 use numpy::PyArray2;
@@ -82,13 +84,40 @@ impl PyTuning {
     fn lock(&self) -> MutexGuard<'_, Tuning> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
 
-    fn end(&self) -> Option<Ending> {
-        match self.lock().next() {
-            Next::Done(ending) => Some(ending),
-            Next::Render { .. } => None,
+fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Tuning> {
+    let knob = match (threshold, samples) {
+        (Some((coarsest, finest)), None) => Knob::Threshold { coarsest, finest },
+        (None, Some((least, most))) => Knob::Samples { least, most },
+        _ => {
+            return Err(ParameterError::new_err(
+                "give threshold=(coarsest, finest) or samples=(least, most)",
+            ));
         }
+    };
+    Tuning::new(knob).map_err(|error| ParameterError::new_err(error.to_string()))
+}
+
+fn ending(next: Next) -> Option<&'static str> {
+    match next {
+        Next::Render { .. } => None,
+        Next::Done(Ending::Found { .. }) => Some("found"),
+        Next::Done(Ending::AtFinest { .. }) => Some("at-finest"),
+        Next::Done(Ending::Unchanged) => Some("unchanged"),
+        Next::Done(Ending::NotFalling { .. }) => Some("not-falling"),
     }
+}
+
+fn setting(next: Next) -> Option<f64> {
+    match next {
+        Next::Done(Ending::Found { setting, .. }) => Some(setting),
+        _ => None,
+    }
+}
+
+fn steps(tuning: &Tuning) -> Vec<(f64, f64)> {
+    tuning.steps().iter().map(|step| (step.setting, step.excess.ratio)).collect()
 }
 
 #[pymethods]
@@ -96,16 +125,7 @@ impl PyTuning {
     #[new]
     #[pyo3(signature = (*, threshold = None, samples = None))]
     fn new(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Self> {
-        let knob = match (threshold, samples) {
-            (Some((coarsest, finest)), None) => Knob::Threshold { coarsest, finest },
-            (None, Some((least, most))) => Knob::Samples { least, most },
-            _ => {
-                return Err(ParameterError::new_err(
-                    "give threshold=(coarsest, finest) or samples=(least, most)",
-                ));
-            }
-        };
-        let tuning = Tuning::new(knob).map_err(|error| ParameterError::new_err(error.to_string()))?;
+        let tuning = begin(threshold, samples)?;
         Ok(Self(Mutex::new(tuning)))
     }
 
@@ -135,30 +155,117 @@ impl PyTuning {
     /// the same pictures), or "not-falling" (more samples do not make it better); None before that.
     #[getter]
     fn ending(&self) -> Option<&'static str> {
-        Some(match self.end()? {
-            Ending::Found { .. } => "found",
-            Ending::AtFinest { .. } => "at-finest",
-            Ending::Unchanged => "unchanged",
-            Ending::NotFalling { .. } => "not-falling",
-        })
+        ending(self.lock().next())
     }
 
     /// The setting that is just enough; None unless one was found.
     #[getter]
     fn setting(&self) -> Option<f64> {
-        match self.end()? {
-            Ending::Found { setting, .. } => Some(setting),
-            _ => None,
-        }
+        setting(self.lock().next())
     }
 
     /// What was tried: (setting, ratio) of each step. One picture with the setting is as good as the mean of the two
     /// that were rendered for it.
     #[getter]
     fn steps(&self) -> Vec<(f64, f64)> {
-        self.lock().steps().iter().map(|step| (step.setting, step.excess.ratio)).collect()
+        steps(&self.lock())
     }
 }
+
+/// What is to be rendered twice, with different seeds, and judged.
+#[pyclass(frozen, get_all, name = "Look", module = "noisefloor")]
+pub(crate) struct PyLook {
+    /// What each picture is rendered with, the same seeds in every step.
+    each: f64,
+    /// The number of the view, such as a frame.
+    view: usize,
+    /// (x, y, width, height) of a part that is judged as a picture of its own; None for the whole.
+    crop: Option<(usize, usize, usize, usize)>,
+    /// Nothing is rendered: the part is cut from the pictures of the whole view that were rendered just before.
+    is_rendered: bool,
+}
+
+/// Search(*, threshold=None, samples=None, views=1, size=None) --
+///
+/// A Tuning over one or several views, such as frames of a sequence: all of them with the first setting, and then the
+/// hardest first, until one fails.
+///
+/// size: (width, height) of each view, if the renderer can render a part of it. Then crops around the worst squares stand
+///     for a large picture, at most a sixth of its pixels, and the whole is looked at again in the end.
+///
+/// Raises ParameterError if the range is empty.
+#[pyclass(frozen, name = "Search", module = "noisefloor")]
+pub(crate) struct PySearch(Mutex<Search>);
+
+impl PySearch {
+    fn lock(&self) -> MutexGuard<'_, Search> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl PySearch {
+    #[new]
+    #[pyo3(signature = (*, threshold = None, samples = None, views = 1, size = None))]
+    fn new(
+        threshold: Option<(f64, f64)>,
+        samples: Option<(u64, u64)>,
+        views: usize,
+        size: Option<(usize, usize)>,
+    ) -> PyResult<Self> {
+        if !(1..=MOST_VIEWS).contains(&views) {
+            return Err(ParameterError::new_err(format!("views must be 1 to {MOST_VIEWS}, not {views}")));
+        }
+        let crops = size.map_or(0, crops_for);
+        Ok(Self(Mutex::new(Search::new(begin(threshold, samples)?, views, crops))))
+    }
+
+    /// next() --
+    ///
+    /// The next Look; None at the end. The same until tell().
+    fn next(&self) -> Option<PyLook> {
+        self.lock().next().map(|Look { each, view, crop, is_rendered, .. }| {
+            let crop = crop.map(|crop| (crop.x, crop.y, crop.width, crop.height));
+            PyLook { each, view, crop, is_rendered }
+        })
+    }
+
+    /// tell(excess) --
+    ///
+    /// What was found of the two pictures, an Excess.
+    fn tell(&self, excess: PyRef<'_, PyExcess>) {
+        self.lock().tell(excess.excess, &excess.squares);
+    }
+
+    /// The views, hardest first as far as it is known.
+    #[getter]
+    fn views(&self) -> Vec<usize> {
+        self.lock().views().to_vec()
+    }
+
+    /// How it ended, as of a Tuning; None before that.
+    #[getter]
+    fn ending(&self) -> Option<&'static str> {
+        let search = self.lock();
+        if search.next().is_some() { None } else { ending(search.tuning().next()) }
+    }
+
+    /// The setting that is just enough; None unless one was found.
+    #[getter]
+    fn setting(&self) -> Option<f64> {
+        let search = self.lock();
+        if search.next().is_some() { None } else { setting(search.tuning().next()) }
+    }
+
+    /// What was tried: (setting, ratio) of each step, as of a Tuning.
+    #[getter]
+    fn steps(&self) -> Vec<(f64, f64)> {
+        steps(self.lock().tuning())
+    }
+}
+
+/// More frames than anybody marks.
+const MOST_VIEWS: usize = 100_000;
 
 /// An Excess, or its ratio.
 #[derive(FromPyObject)]

@@ -857,6 +857,29 @@ class Settings(unittest.TestCase):
         self.assertTrue(0.75 < other.ratio < 1.15, other)
         self.assertEqual(tuning.steps[-1][1], found.ratio)
 
+    def test_crops_stand_for_a_large_picture_and_the_whole_is_looked_at_in_the_end(self):
+        params, size = nf.Params(tone_mapping="srgb"), (512, 256)
+
+        def render(look, seed):
+            noise = np.random.default_rng((seed, look.view)).standard_normal((size[1], size[0], 3))
+            # The second view has three times the noise, and all of it where it is right of 384
+            noise *= np.where(np.arange(size[0]) < 384, 0.3, 3.0 if look.view else 1.0)[None, :, None]
+            x, y, width, height = look.crop or (0, 0, *size)
+            return np.float32(0.4 + look.each * noise)[y : y + height, x : x + width]
+
+        search, looks = nf.Search(threshold=(0.05, 0.0001), views=2, size=size), []
+        while (look := search.next()) is not None:
+            looks.append(look)
+            self.assertIsNone(search.ending)
+            search.tell(nf.excess(render(look, 1), render(look, 2), params=params))
+        self.assertEqual((search.ending, search.views), ("found", [1, 0]))
+        whole = [(look.view, look.each) for look in looks if look.crop is None]
+        self.assertEqual([view for view, _ in whole], [0, 1, 1, 0])
+        crops = [look for look in looks if look.crop]
+        self.assertTrue(crops[0].is_rendered and not crops[-1].is_rendered)
+        self.assertTrue(all(look.view == 1 and look.crop[0] >= 352 and look.crop[2:] == (128, 128) for look in crops))
+        self.assertLessEqual(search.steps[-1][1], 1)
+
     def test_denoised_pictures_are_judged_by_what_they_have_lost(self):
         def blur(picture, by):
             return sum(np.roll(picture, (dy, dx), (0, 1)) for dy in by for dx in by) / np.float32(len(by) ** 2)

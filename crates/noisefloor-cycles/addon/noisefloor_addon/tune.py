@@ -9,13 +9,14 @@ import time
 import bpy
 import noisefloor
 
-from . import denoise, display, frame, hooks, judging
+from . import denoise, display, frame, hooks, judging, sampling
 
 ENDINGS = {
     "at-finest": "even the finest threshold tried is not enough",
     "unchanged": "a finer threshold changes nothing: Max Samples is reached first, raise it",
     "not-falling": "more samples do not help: what is wrong is no noise",
 }
+BORDER = ["use_border", "use_crop_to_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y"]
 
 
 class Search:
@@ -25,7 +26,6 @@ class Search:
         self.scene, self.denoised = scene, scene.cycles.use_denoising
         if self.denoised and denoise.library() is None:
             raise ValueError("this Blender has no Open Image Denoise: turn Denoise off")
-        self.tuning = noisefloor.Tuning(threshold=(frame.COARSEST, frame.FINEST))
         self.before, self.frames, self.film = scene.frame_current, [scene.frame_current], None
         if scene.noisefloor.frames == "markers":
             marked = {marker.frame for marker in scene.timeline_markers}
@@ -34,25 +34,36 @@ class Search:
                 raise ValueError("no frame between the first and the last is marked: add markers in the timeline")
             self.film = frame.film_rate(scene)
         self.judge = judging.Judge(scene, display.table(scene), self.film)
-        # Of this step: what was found in frames so far
-        self.found = []
-        self.pictures, self.excess, self.begun, self.seconds = [], None, 0.0, 0.0
-        self.borrowed = []
+        shot = scene.render
+        self.size = tuple(
+            side * shot.resolution_percentage // 100 for side in (shot.resolution_x, shot.resolution_y)
+        )
+        # A region of the user's own is a picture of its own, and small
+        self.search = noisefloor.Search(
+            threshold=(frame.COARSEST, frame.FINEST),
+            views=len(self.frames),
+            size=None if shot.use_border else self.size,
+        )
+        # What is rendered next, the whole pictures of frames that crops may be cut from, and seconds of whole pictures
+        self.look, self.whole, self.pictures, self.begun, self.seconds = self.search.next(), {}, [], 0.0, []
+        # Cycles loads the scene once for all of them
+        self.borrowed, self.persistent = [], shot.use_persistent_data
+        shot.use_persistent_data = True
 
     @property
     def done(self):
-        return self.tuning.next() is None
+        return self.look is None
 
     def borrow(self):
         """What the next picture is rendered with."""
         scene, layers = self.scene, self.scene.view_layers
-        if scene.frame_current != self.frames[len(self.found)]:
-            scene.frame_set(self.frames[len(self.found)])
-        cycles = scene.cycles
+        if scene.frame_current != self.frames[self.look.view]:
+            scene.frame_set(self.frames[self.look.view])
+        cycles, shot = scene.cycles, scene.render
         wanted = [
             (scene.noisefloor, "use", False),
             (cycles, "use_adaptive_sampling", True),
-            (cycles, "adaptive_threshold", self.tuning.next()),
+            (cycles, "adaptive_threshold", self.look.each),
             (cycles, "seed", (cycles.seed * 2 + len(self.pictures) + 1) % 2**31),
             (cycles, "use_animated_seed", False),
             (cycles, "use_denoising", False),
@@ -61,9 +72,12 @@ class Search:
         ]
         if self.denoised:
             wanted += [(layer.cycles, "denoising_store_passes", True) for layer in layers]
-        self.borrowed = [(group, name, getattr(group, name)) for group, name, _ in wanted]
+        owned = [(group, name) for group, name, _ in wanted] + [(shot, name) for name in BORDER]
+        self.borrowed = [(group, name, getattr(group, name)) for group, name in owned]
         for group, name, value in wanted:
             setattr(group, name, value)
+        if self.look.crop:
+            sampling.aim(shot, self.size, self.look.crop)
         # A render that was stopped may have left some
         hooks.state.wanted, hooks.state.rendered = True, {}
         self.begun = time.monotonic()
@@ -76,8 +90,9 @@ class Search:
         self.borrowed = []
 
     def end(self):
-        """The frame that was shown before."""
+        """The frame that was shown before, and nothing kept of the scene."""
         self.give_back()
+        self.scene.render.use_persistent_data = self.persistent
         if self.scene.frame_current != self.before:
             self.scene.frame_set(self.before)
 
@@ -89,50 +104,53 @@ class Search:
             raise ValueError("nothing was rendered; is there a view layer that is used for rendering?")
         # The layer that people see first stands for the frame
         self.pictures.append(next(iter(rendered.values())))
-        self.seconds += time.monotonic() - self.begun
+        if self.look.crop is None:
+            self.seconds = [*self.seconds[-1:], time.monotonic() - self.begun]
         if len(self.pictures) < 2:
             return
         pictures, self.pictures = self.pictures, []
-        self.found.append(self.judge.excess(pictures))
-        # The first setting is tried in all frames, the others in those that were hard, until one fails
-        first, fails = not self.tuning.steps, self.found[-1].ratio > 1
-        if len(self.found) < len(self.frames) and (first or not fails):
-            return
-        found, self.found = self.found, []
-        hard = sorted(range(len(found)), key=lambda place: -found[place].ratio)
-        order = hard if first else [hard[0], *(place for place in range(len(self.frames)) if place != hard[0])]
-        self.frames = [self.frames[place] for place in order]
-        self.excess, self.last, self.seconds = found[hard[0]], self.seconds / len(found), 0.0
-        self.tuning.tell(self.excess)
+        if self.look.crop is None:
+            self.whole[self.look.view] = pictures
+        self.search.tell(self.judge.excess(pictures))
+        while (look := self.search.next()) and look.is_rendered:
+            x, y, width, height = look.crop
+            here = slice(y, y + height), slice(x, x + width)
+            cut = [{name: each[here] for name, each in picture.items()} for picture in self.whole[look.view]]
+            self.search.tell(self.judge.excess(cut))
+        if look is None or look.crop or look.each != self.look.each:
+            self.whole = {}
+        self.look = look
 
     def status(self):
         """One line on how far it is."""
-        steps = self.tuning.steps
+        steps = self.search.steps
         text = f"noisefloor: picture {len(self.pictures) + 1} of 2"
-        if len(self.frames) > 1:
-            text += f" of frame {self.frames[len(self.found)]}"
+        if self.look and self.look.crop:
+            text += " of a part"
+        if self.look and len(self.frames) > 1:
+            text += f" of frame {self.frames[self.look.view]}"
         if steps:
             text += f"; {steps[-1][0]:.3g} leaves {steps[-1][1]:.2f} times what may be seen"
         return text
 
     def finish(self):
         """Writes what was found into the scene; returns what it says."""
-        if self.tuning.setting is None:
-            raise ValueError(ENDINGS[self.tuning.ending])
+        if self.search.setting is None:
+            raise ValueError(ENDINGS[self.search.ending])
         cycles = self.scene.cycles
-        cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, self.tuning.setting
+        cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, self.search.setting
         people = (
             "nobody would see what is wrong with the denoised picture, by the vision model"
             if self.denoised
             else f"{self.scene.noisefloor.people:.0%} of people see no noise"
         )
         if len(self.frames) > 1:
-            people += f", frame {self.frames[0]} is the hardest of {len(self.frames)}"
+            people += f", frame {self.frames[self.search.views[0]]} is the hardest of {len(self.frames)}"
         if self.film:
             people += f", at {self.film:g} frames a second"
         # One picture with the setting takes what both took with a coarser one
-        share = (self.tuning.steps[-1][0] / self.tuning.setting) ** 2
-        return f"{self.tuning.setting:.3g}: {people}; about {self.last * share:.0f} s a frame"
+        share = (self.search.steps[-1][0] / self.search.setting) ** 2
+        return f"{self.search.setting:.3g}: {people}; about {sum(self.seconds) * share:.0f} s a frame"
 
 
 class RENDER_OT_noisefloor_threshold(bpy.types.Operator):

@@ -4,12 +4,13 @@ mod keep;
 mod pictures;
 
 use crate::tune::keep::Keep;
-use crate::tune::pictures::{CROP, Crop, Judged, Judges, View};
+use crate::tune::pictures::{Crop, Judged, Judges, Pair, View};
+use anyhow::bail;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{Ending, Excess, Knob, Next, Tuning};
-use noisefloor::{Audience, Oracle, Params, Viewing};
+use noisefloor::tune::{CROP, Ending, Excess, Knob, Look, Next, Search, Tuning};
+use noisefloor::{Audience, Oracle, Params, ToneMapping, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::{note, say, say_json};
@@ -72,6 +73,9 @@ struct Row {
     frame: Option<u32>,
     x: Option<usize>,
     y: Option<usize>,
+    /// How many crops stood for the whole; 0 if it was judged itself.
+    #[serde(default)]
+    crops: usize,
     /// Follows from the pictures, so that equal ones are known ([`Excess::pictures`]).
     pictures: u64,
     /// Of each picture ([`Excess::noise`]).
@@ -111,53 +115,49 @@ pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
         None => "stopped; what was found so far stands above",
     })?;
     let keep = job.keep.take().map(|folder| Keep::claim(folder, job.earlier)).transpose()?;
-    let mut search = Search::begin(&job)?;
+    let mut tune = Tune::begin(&job)?;
     if let (Some(keep), Earlier::Resume) = (&keep, job.earlier) {
-        search.resume(keep, &job)?;
+        tune.resume(keep, &job)?;
     }
-    let ending = loop {
-        let (each, setting) = match search.tuning.next() {
-            Next::Done(ending) => break ending,
-            Next::Render { each, setting } => (each, setting),
-        };
-        let (row, judged) = search.step(&job, each, setting)?;
+    while let Some(look) = tune.search.next() {
+        let Some(judged) = tune.look(&job, look)? else { continue };
+        let row = &tune.rows[tune.rows.len() - 1];
         if !job.quiet && !job.json {
-            say_step(&job, &row)?;
+            say_step(&job, row)?;
         }
-        search.rows.push(row);
         if let Some(keep) = &keep {
             keep.write_pictures(&judged)?;
-            keep.write_report(&search.report(None))?;
+            keep.write_report(&tune.report(None))?;
         }
-    };
-    let report = search.report(Some(ending));
+    }
+    let Next::Done(ending) = tune.search.tuning().next() else { bail!("the search has not ended") };
+    let report = tune.report(Some(ending));
     if let Some(keep) = &keep {
         keep.write_report(&report)?;
     }
     say_all(&job, &report, ending)?;
-    search.views.iter().flat_map(View::notes).for_each(|line| note!("note: {line}"));
+    tune.views.iter().flat_map(View::notes).for_each(|line| note!("note: {line}"));
     Ok(if matches!(ending, Ending::Found { .. }) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// A search in progress.
-struct Search<'a> {
-    tuning: Tuning,
+struct Tune<'a> {
+    search: Search,
     /// One, or the frames of a sequence.
     views: Vec<View>,
-    /// What is looked at, worst first.
-    places: Vec<Place>,
+    /// How each is displayed, once it was seen.
+    tones: Vec<Option<ToneMapping>>,
     judges: Judges<'a>,
     identity: Vec<SourceIdentity>,
     rows: Vec<Row>,
+    /// Of the looks since the last row: whole pictures, of which crops may be wanted, and the times.
+    whole: Vec<(usize, Pair)>,
+    worst: Option<(Look, Judged)>,
+    rendering: Duration,
+    judging: Duration,
 }
 
-/// A view, or a part of it.
-struct Place {
-    view: usize,
-    crop: Option<Crop>,
-}
-
-impl<'a> Search<'a> {
+impl<'a> Tune<'a> {
     fn begin(job: &'a TuneJob) -> anyhow::Result<Self> {
         let mut params = Params::default().with_viewing(job.viewing).with_tile(TILE);
         (params.tone_mapping, params.audience) = (job.tone.load()?, job.audience);
@@ -169,132 +169,103 @@ impl<'a> Search<'a> {
         let views = frames.into_iter().map(|frame| View::open(job, frame));
         let views: Vec<View> = views.collect::<anyhow::Result<_>>()?;
         let identity: anyhow::Result<_> = views.iter().map(|view| view.identity(job, &judges)).collect();
-        let places = (0..views.len()).map(|view| Place { view, crop: None }).collect();
-        Ok(Self { tuning: job.tuning.clone(), identity: identity?, views, places, judges, rows: Vec::new() })
+        let search = Search::new(job.tuning.clone(), views.len(), job.regions);
+        Ok(Self {
+            search,
+            identity: identity?,
+            tones: vec![None; views.len()],
+            views,
+            judges,
+            rows: Vec::new(),
+            whole: Vec::new(),
+            worst: None,
+            rendering: Duration::ZERO,
+            judging: Duration::ZERO,
+        })
     }
 
     /// Takes over what an earlier search has found.
     fn resume(&mut self, keep: &Keep, job: &TuneJob) -> anyhow::Result<()> {
         let Some(kept) = keep.earlier(&self.identity)? else { return Ok(()) };
-        let hard = |place: &Place| {
-            let frame = self.views[place.view].frame;
-            kept.frames.iter().position(|kept| frame == Some(*kept))
-        };
-        self.places.sort_by_key(hard);
+        let mut tuning = job.tuning.clone();
         for row in kept.steps {
             // With another --from or --to, the search may go another way from some step on
-            if !matches!(self.tuning.next(), Next::Render { setting, .. } if setting == row.setting) {
+            if !matches!(tuning.next(), Next::Render { setting, .. } if setting == row.setting) {
                 break;
             }
-            self.tuning.tell(row.excess());
+            tuning.tell(row.excess());
             if !job.quiet && !job.json {
                 say_step(job, &row)?;
             }
             self.rows.push(row);
         }
+        let number = |frame: &u32| self.views.iter().position(|view| view.frame == Some(*frame));
+        let hardest: Vec<usize> = kept.frames.iter().filter_map(number).collect();
+        self.search = Search::new(tuning, self.views.len(), job.regions).ordered(&hardest);
         Ok(())
     }
 
-    /// Renders and judges two pictures of every place; from the second setting on, only until one fails, in the order
-    /// in which they were hard. Of the worst, what is found.
-    fn step(&mut self, job: &TuneJob, each: f64, setting: f64) -> anyhow::Result<(Row, Judged)> {
-        let (mut rendering, mut judging) = (Duration::ZERO, Duration::ZERO);
-        let mut found: Vec<(usize, Judged)> = Vec::new();
-        for (number, Place { view, crop }) in self.places.iter().enumerate() {
-            let view = &mut self.views[*view];
-            let mut what = format!("{} {setting}", name(job.tuning.knob()));
-            if let Some(frame) = view.frame {
-                what += &format!(", frame {frame}");
-            }
-            if let Some(crop) = crop {
-                what += &format!(", around ({}, {})", crop.tile.x + CROP / 2, crop.tile.y + CROP / 2);
-            }
-            let bar = spinner(job.quiet, format!("{what}: two pictures"));
-            let start = Instant::now();
-            let pair = view.pictures.pair(each, crop.as_ref().map(|crop| crop.tile), &bar)?;
-            rendering += start.elapsed();
-            bar.set_message(format!("{what}: judging"));
-            let start = Instant::now();
-            let judged = self.judges.judge(pair, view.guides.as_ref(), crop.as_ref())?;
-            judging += start.elapsed();
-            bar.finish_and_clear();
-            let fails = judged.excess.ratio > 1.0;
-            found.push((number, judged));
-            if fails && !self.rows.is_empty() {
-                break;
-            }
+    /// Renders and judges two pictures; the worst of all with this setting, where they were the last.
+    fn look(&mut self, job: &TuneJob, look: Look) -> anyhow::Result<Option<Judged>> {
+        let view = &mut self.views[look.view];
+        let mut what = format!("{} {}", name(job.tuning.knob()), look.setting);
+        if let Some(frame) = view.frame {
+            what += &format!(", frame {frame}");
         }
-        found.sort_by(|(_, a), (_, b)| b.excess.ratio.total_cmp(&a.excess.ratio));
-        let worst = found[0].0;
-        let frame = self.views[self.places[worst].view].frame;
-        // The noise of another place says nothing of the setting
-        let comparable = worst == 0 && (self.rows.len() != 1 || job.regions == 0);
-        if !self.rows.is_empty() {
-            self.places[..=worst].rotate_right(1);
-        } else if job.regions > 0 {
-            self.places = self.worst_crops(job.regions, &found);
-        } else {
-            self.places = found
-                .iter()
-                .map(|(number, _)| Place { view: self.places[*number].view, crop: None })
-                .collect();
+        if let Some(crop) = look.crop {
+            what += &format!(", around ({}, {})", crop.x + CROP / 2, crop.y + CROP / 2);
         }
-        let (_, mut worst) = found.swap_remove(0);
-        if !comparable && !self.rows.is_empty() {
-            worst.excess.noise = 0.0;
-        }
-        self.tuning.tell(worst.excess);
-        let Excess { ratio, place, pictures, noise } = worst.excess;
-        let row = Row {
-            setting,
-            each,
-            ratio: ratio.is_finite().then_some(ratio),
-            frame,
-            x: place.map(|(x, _)| x),
-            y: place.map(|(_, y)| y),
-            pictures,
-            noise,
-            seconds: rendering.as_secs_f64(),
-            judging_seconds: judging.as_secs_f64(),
+        let bar = spinner(job.quiet, format!("{what}: two pictures"));
+        let start = Instant::now();
+        let rendered = self.whole.iter().find(|(number, _)| look.is_rendered && *number == look.view);
+        let pair = match (rendered, look.crop) {
+            (Some((_, whole)), Some(crop)) => whole.cropped(crop),
+            _ => view.pictures.pair(look.each, look.crop, &bar)?,
         };
-        Ok((row, worst))
-    }
-
-    /// So many crops around the worst squares of whole pictures, none of them in the middle of another.
-    fn worst_crops(&self, count: usize, found: &[(usize, Judged)]) -> Vec<Place> {
-        let squares = found.iter().flat_map(|(number, judged)| {
-            let view = self.places[*number].view;
-            judged.squares.iter().map(move |square| (view, judged, square))
-        });
-        let mut squares: Vec<_> = squares.collect();
-        squares.sort_by(|(.., (_, a)), (.., (_, b))| b.total_cmp(a));
-        let mut places: Vec<Place> = Vec::new();
-        for (view, judged, (square, _)) in squares {
-            let crop = Crop::around(*square, judged, &self.judges);
-            let apart = |place: &Place| match &place.crop {
-                Some(other) => {
-                    place.view != view
-                        || other.tile.x.abs_diff(crop.tile.x) >= CROP / 2
-                        || other.tile.y.abs_diff(crop.tile.y) >= CROP / 2
-                }
-                None => true,
-            };
-            if places.len() < count && places.iter().all(apart) {
-                places.push(Place { view, crop: Some(crop) });
-            }
+        self.rendering += start.elapsed();
+        bar.set_message(format!("{what}: judging"));
+        let start = Instant::now();
+        if look.crop.is_none() && job.regions > 0 {
+            self.whole.push((look.view, pair.clone()));
         }
-        places
+        let crop = look.crop.zip(self.tones[look.view].clone()).map(|(tile, tone)| Crop { tile, tone });
+        let judged = self.judges.judge(pair, view.guides.as_ref(), crop.as_ref())?;
+        self.judging += start.elapsed();
+        bar.finish_and_clear();
+        if look.crop.is_none() {
+            self.tones[look.view] = Some(self.judges.tone(&judged));
+        }
+        let done = self.search.tell(judged.excess, &judged.squares);
+        let worse = |worst: &(Look, Judged)| judged.excess.ratio > worst.1.excess.ratio;
+        // Crops of whole pictures are another look at the same
+        if !look.is_rendered && self.worst.as_ref().is_none_or(worse) {
+            self.worst = Some((look, judged));
+        }
+        if !done {
+            return Ok(None);
+        }
+        self.whole.clear();
+        let Some((look, judged)) = self.worst.take() else { return Ok(None) };
+        let told = self.search.tuning().steps().last().map_or(judged.excess, |step| step.excess);
+        self.rows.push(Row {
+            setting: look.setting,
+            each: look.each,
+            ratio: told.ratio.is_finite().then_some(told.ratio),
+            frame: self.views[look.view].frame,
+            x: judged.excess.place.map(|(x, _)| x),
+            y: judged.excess.place.map(|(_, y)| y),
+            crops: if look.crop.is_some() { job.regions } else { 0 },
+            pictures: told.pictures,
+            noise: told.noise,
+            seconds: std::mem::take(&mut self.rendering).as_secs_f64(),
+            judging_seconds: std::mem::take(&mut self.judging).as_secs_f64(),
+        });
+        Ok(Some(judged))
     }
 
     /// Those of a sequence, worst first.
     fn frames(&self) -> Vec<u32> {
-        let mut frames = Vec::new();
-        for frame in self.places.iter().filter_map(|place| self.views[place.view].frame) {
-            if !frames.contains(&frame) {
-                frames.push(frame);
-            }
-        }
-        frames
+        self.search.views().iter().filter_map(|&view| self.views[view].frame).collect()
     }
 
     fn report(&self, ending: Option<Ending>) -> Report {
@@ -310,14 +281,19 @@ impl<'a> Search<'a> {
             Some(Ending::NotFalling { .. }) => "not-falling",
         };
         Report {
-            knob: name(self.tuning.knob()),
+            knob: name(self.search.tuning().knob()),
             setting,
             enough,
             too_coarse,
             ending,
             judged: self.judges.said(),
             frames: self.frames(),
-            regions: self.places.iter().filter_map(|place| place.crop.as_ref()).map(Crop::corners).collect(),
+            regions: self
+                .search
+                .crops()
+                .iter()
+                .map(|(_, crop)| [crop.x, crop.y, crop.width, crop.height])
+                .collect(),
             steps: self.rows.clone(),
             seconds: self.rows.iter().map(|row| row.seconds + row.judging_seconds).sum(),
             identity: self.identity.clone(),
@@ -363,6 +339,9 @@ fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
     if let Some(frame) = row.frame {
         at = format!("{at} in frame {frame}");
     }
+    if row.crops > 0 {
+        at += ", looked at in crops";
+    }
     let name = name(job.tuning.knob());
     Ok(say!("{name} {}: {what}, at worst{at}; {:.1} s", row.setting, row.seconds + row.judging_seconds)?)
 }
@@ -407,16 +386,9 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
     }
     if matches!(ending, Ending::Found { .. }) {
         let last: f64 = report.steps.last().map_or(0.0, |step| step.seconds);
-        let many = report.frames.len() > 1 || !report.regions.is_empty();
+        let many = report.frames.len() > 1;
         let pictures = if many { "the last pictures" } else { "the last two pictures" };
         say!("{}; {:.0} s, of which {pictures} took {last:.0} s", report.judged, report.seconds)?;
-        if !report.regions.is_empty() {
-            let places = match report.regions.len() {
-                1 => "the place that was".to_owned(),
-                count => format!("the {count} places that were"),
-            };
-            say!("only {places} worst with the coarsest setting had another look")?;
-        }
     }
     Ok(())
 }

@@ -32,6 +32,7 @@ pub enum Pictures {
 }
 
 /// A pair as it was rendered.
+#[derive(Clone)]
 pub struct Pair {
     size: (usize, usize),
     pictures: [Vec<Rgb>; 2],
@@ -39,36 +40,19 @@ pub struct Pair {
     spp: Option<f64>,
 }
 
-/// Edge of crops, in pixels: a square that is judged, and half of one around it.
-pub const CROP: usize = 128;
+impl Pair {
+    /// A part of both.
+    pub fn cropped(&self, part: Tile) -> Self {
+        let pictures = self.pictures.each_ref().map(|picture| cut(part, self.size.0, picture));
+        Self { size: (part.width, part.height), pictures, spp: self.spp }
+    }
+}
 
 /// A part of a picture.
 pub struct Crop {
     pub tile: Tile,
     /// With the exposure of the whole.
-    tone: ToneMapping,
-}
-
-impl Crop {
-    pub fn around(square: Tile, whole: &Judged, judges: &Judges<'_>) -> Self {
-        let (width, height) = whole.size;
-        let place = |at: usize, edge: usize, side: usize| {
-            (at + edge / 2).saturating_sub(CROP / 2).min(side.saturating_sub(CROP))
-        };
-        let (x, y) = (place(square.x, square.width, width), place(square.y, square.height, height));
-        let tone = match &judges.params.tone_mapping {
-            ToneMapping::Reinhard { white, .. } => {
-                ToneMapping::ReinhardAt { exposure: whole.display.exposure(), white: *white }
-            }
-            other => other.clone(),
-        };
-        Self { tile: Tile { index: 0, x, y, width: CROP.min(width), height: CROP.min(height) }, tone }
-    }
-
-    pub fn corners(&self) -> [usize; 4] {
-        let Tile { x, y, width, height, .. } = self.tile;
-        [x, y, width, height]
-    }
+    pub tone: ToneMapping,
 }
 
 /// What was found of a pair, and the picture that people would look at.
@@ -282,6 +266,16 @@ impl<'a> Judges<'a> {
             }
         };
         Ok(Self { criterion, params, denoiser, warned: false })
+    }
+
+    /// How parts of a picture are displayed: as the whole.
+    pub fn tone(&self, whole: &Judged) -> ToneMapping {
+        match &self.params.tone_mapping {
+            ToneMapping::Reinhard { white, .. } => {
+                ToneMapping::ReinhardAt { exposure: whole.display.exposure(), white: *white }
+            }
+            other => other.clone(),
+        }
     }
 
     /// What the verdict is about, in words.

@@ -1,0 +1,378 @@
+//! A search over several pictures, or over parts of large ones.
+
+use super::{Ending, Excess, Next, Tuning};
+use crate::tile::Tile;
+
+/// Edge of crops, in pixels: a square that is judged, and half of one around it.
+pub const CROP: usize = 128;
+
+/// A picture that two seeds are to be rendered of, and judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// What each of the two is rendered with.
+    pub each: f64,
+    /// One picture with this setting would be as good as their mean.
+    pub setting: f64,
+    /// The number of the view, such as a frame of a sequence.
+    pub view: usize,
+    /// A part of it, to be judged as a picture of its own; `None` for the whole.
+    pub crop: Option<Tile>,
+    /// Nothing is rendered: the part is cut from the pictures of the whole view that were rendered with this setting, just
+    /// before.
+    pub is_rendered: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Place {
+    view: usize,
+    crop: Option<Tile>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Seen {
+    place: Place,
+    excess: Excess,
+    squares: Vec<(Tile, f64)>,
+}
+
+/// What the looks are for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Purpose {
+    /// All whole views, with the first setting.
+    First,
+    /// Crops of pictures that have been rendered, as they are judged from now on. `worst`: of the whole.
+    Closer { worst: f64 },
+    /// The next setting: hardest places first, until one fails.
+    Step,
+    /// The setting that was enough for crops: whole views, until one fails.
+    Again,
+}
+
+/// A [`Tuning`] over one or several views. With the first setting, all of them are looked at as a whole; with the next ones
+/// only until one fails, in the order in which they were hard. Of large views, crops around the worst squares may
+/// stand for the whole: the setting that is enough for them is tried on the whole in the end, and if that is not so, the search
+/// goes on in other crops.
+///
+/// ```
+/// use noisefloor::tune::{Ending, Excess, Knob, Next, Search, Tuning};
+///
+/// let tuning = Tuning::new(Knob::Threshold { coarsest: 0.1, finest: 0.001 })?;
+/// let mut search = Search::new(tuning, 3, 0);
+/// while let Some(look) = search.next() {
+///     // The frame with number 1 is the hardest
+///     let enough = [0.05, 0.02, 0.04][look.view];
+///     search.tell(Excess::new(look.setting / enough), &[]);
+/// }
+/// assert_eq!(search.views(), [1, 2, 0]);
+/// let Next::Done(Ending::Found { setting, .. }) = search.tuning().next() else { panic!() };
+/// assert!(setting > 0.01 && setting <= 0.02);
+/// # Ok::<(), noisefloor::tune::KnobError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Search {
+    tuning: Tuning,
+    crops: usize,
+    purpose: Purpose,
+    /// What is looked at, hardest first, and what was found so far.
+    places: Vec<Place>,
+    seen: Vec<Seen>,
+    /// All views, hardest first.
+    views: Vec<usize>,
+    /// The place whose noise the last step has told.
+    told: Option<Place>,
+}
+
+impl Search {
+    /// A search over so many views, of which so many crops stand for the whole; 0 for none. A tuning that has steps goes on from
+    /// there.
+    pub fn new(tuning: Tuning, views: usize, crops: usize) -> Self {
+        let purpose = if tuning.steps().is_empty() { Purpose::First } else { Purpose::Step };
+        let views: Vec<usize> = (0..views.max(1)).collect();
+        let places = views.iter().map(|&view| Place { view, crop: None }).collect();
+        Self { tuning, crops, purpose, places, seen: Vec::new(), views, told: None }.ordered(&[])
+    }
+
+    /// With these views first, hardest first, as an earlier search has found.
+    #[must_use]
+    pub fn ordered(mut self, hardest: &[usize]) -> Self {
+        self.views = first(hardest.iter().copied().filter(|view| self.views.contains(view)), &self.views);
+        self.places = self.whole();
+        self.told = (!self.tuning.steps().is_empty()).then(|| self.places[0]);
+        self
+    }
+
+    /// The search of the setting.
+    pub fn tuning(&self) -> &Tuning {
+        &self.tuning
+    }
+
+    /// All views, hardest first as far as it is known.
+    pub fn views(&self) -> &[usize] {
+        &self.views
+    }
+
+    /// The crops that stand for the whole, hardest first: view and place.
+    pub fn crops(&self) -> Vec<(usize, Tile)> {
+        self.places.iter().filter_map(|place| Some((place.view, place.crop?))).collect()
+    }
+
+    /// What to look at next; `None` at the end. The same until [`Search::tell`].
+    pub fn next(&self) -> Option<Look> {
+        let (each, setting) = match (self.purpose, self.tuning.next(), self.tuning.steps().last()) {
+            // Of the setting before, which the tuning has been told of
+            (Purpose::Again, _, Some(last)) => (last.each, last.setting),
+            (Purpose::Closer { .. }, _, Some(last)) => (last.each, last.setting),
+            (_, Next::Render { each, setting }, _) => (each, setting),
+            (_, Next::Done(_), _) => return None,
+        };
+        let Place { view, crop } = *self.places.get(self.seen.len())?;
+        let is_rendered = matches!(self.purpose, Purpose::Closer { .. });
+        Some(Look { each, setting, view, crop, is_rendered })
+    }
+
+    /// What was found there: in the worst place, and in [`squares`](super::squares) of the picture, as far as crops are
+    /// wanted. Returns whether that was the last look with this setting, for now; at the end, nothing happens.
+    pub fn tell(&mut self, excess: Excess, squares: &[(Tile, f64)]) -> bool {
+        let Some(look) = self.next() else { return true };
+        let place = Place { view: look.view, crop: look.crop };
+        self.seen.push(Seen { place, excess, squares: squares.to_vec() });
+        let all = matches!(self.purpose, Purpose::First | Purpose::Closer { .. });
+        if self.seen.len() < self.places.len() && (all || excess.ratio <= 1.0) {
+            return false;
+        }
+        let mut seen = std::mem::take(&mut self.seen);
+        seen.sort_by(|a, b| b.excess.ratio.total_cmp(&a.excess.ratio));
+        self.views = first(seen.iter().map(|seen| seen.place.view), &self.views);
+        let Seen { place, mut excess, .. } = seen[0];
+        match self.purpose {
+            Purpose::First => {
+                let crops = self.choose(&seen);
+                let mut whole = self.tuning.clone();
+                whole.tell(excess);
+                if !crops.is_empty() && matches!(whole.next(), Next::Render { .. }) {
+                    (self.places, self.purpose) = (crops, Purpose::Closer { worst: excess.ratio });
+                    return false;
+                }
+                self.tuning = whole;
+                self.go_on(place, &seen);
+            }
+            Purpose::Closer { worst } => {
+                if self.tuning.steps().is_empty() {
+                    // What is seen in the whole is there
+                    excess.ratio = excess.ratio.max(worst);
+                    self.tuning.tell(excess);
+                    self.told = Some(place);
+                }
+                (self.places, self.purpose) = (seen.iter().map(|seen| seen.place).collect(), Purpose::Step);
+            }
+            Purpose::Step => {
+                // Another place says nothing of what the setting has changed
+                if self.told != Some(place) {
+                    excess.noise = 0.0;
+                    self.tuning.since = self.tuning.steps.len();
+                }
+                self.tuning.tell(excess);
+                self.go_on(place, &seen);
+                let found = matches!(self.tuning.next(), Next::Done(Ending::Found { .. }));
+                if found && place.crop.is_some() {
+                    (self.places, self.purpose) = (self.whole(), Purpose::Again);
+                }
+            }
+            Purpose::Again => {
+                self.tuning.correct(excess.ratio);
+                self.purpose = Purpose::Step;
+                let crops = self.choose(&seen);
+                if matches!(self.tuning.next(), Next::Render { .. }) && !crops.is_empty() {
+                    (self.places, self.purpose) = (crops, Purpose::Closer { worst: excess.ratio });
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// After a step: those that were seen first, worst first.
+    fn go_on(&mut self, told: Place, seen: &[Seen]) {
+        self.places = first(seen.iter().map(|seen| seen.place), &self.places);
+        (self.told, self.purpose) = (Some(told), Purpose::Step);
+    }
+
+    fn whole(&self) -> Vec<Place> {
+        self.views.iter().map(|&view| Place { view, crop: None }).collect()
+    }
+
+    /// Crops around the worst squares, none of them in the middle of another.
+    fn choose(&self, seen: &[Seen]) -> Vec<Place> {
+        let all = seen.iter().flat_map(|seen| seen.squares.iter().map(move |square| (seen, square)));
+        let mut all: Vec<_> = all.collect();
+        all.sort_by(|(_, (_, a)), (_, (_, b))| b.total_cmp(a));
+        let mut crops: Vec<Place> = Vec::new();
+        for (seen, (square, _)) in all {
+            let edge = |end: fn(&Tile) -> usize| seen.squares.iter().map(|(square, _)| end(square)).max();
+            let (width, height) =
+                (edge(|s| s.x + s.width).unwrap_or(0), edge(|s| s.y + s.height).unwrap_or(0));
+            let start = |at: usize, edge: usize, side: usize| {
+                (at + edge / 2).saturating_sub(CROP / 2).min(side.saturating_sub(CROP))
+            };
+            let (x, y) = (start(square.x, square.width, width), start(square.y, square.height, height));
+            let tile = Tile { index: 0, x, y, width: CROP.min(width), height: CROP.min(height) };
+            let place = Place { view: seen.place.view, crop: Some(tile) };
+            let apart = |other: &Place| {
+                other.view != place.view
+                    || other.crop.is_none_or(|other| {
+                        other.x.abs_diff(x) >= CROP / 2 || other.y.abs_diff(y) >= CROP / 2
+                    })
+            };
+            if crops.len() < self.crops && crops.iter().all(apart) {
+                crops.push(place);
+            }
+        }
+        crops
+    }
+}
+
+/// As many crops as stand for a picture of this size, if they are to have no more than a sixth of its pixels: 4 at most, 0
+/// if it is small.
+pub fn crops_for((width, height): (usize, usize)) -> usize {
+    (width.saturating_mul(height) / (6 * CROP * CROP)).min(4)
+}
+
+/// Those, each once, and then the others.
+fn first<T: Copy + PartialEq>(those: impl Iterator<Item = T>, others: &[T]) -> Vec<T> {
+    let mut all = Vec::with_capacity(others.len());
+    for one in those.chain(others.iter().copied()) {
+        if !all.contains(&one) {
+            all.push(one);
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Knob, squares};
+    use super::*;
+    use proptest::prelude::*;
+
+    const SIZE: (usize, usize) = (640, 384);
+    const KNOB: Knob = Knob::Threshold { coarsest: 0.2, finest: 1e-6 };
+
+    /// What is wrong in a square of the view, with a threshold.
+    type Law<'a> = &'a dyn Fn(usize, &Tile, f64) -> f64;
+
+    /// The looks of a search, and how it ended.
+    fn search(views: usize, crops: usize, law: Law<'_>) -> (Vec<Look>, Search) {
+        let mut search = Search::new(Tuning::new(KNOB).unwrap(), views, crops);
+        let mut looks = Vec::new();
+        while let Some(look) = search.next() {
+            looks.push(look);
+            assert!(looks.len() < 100, "no end: {looks:?}");
+            let inside = |square: &Tile| {
+                look.crop.is_none_or(|crop| {
+                    square.x >= crop.x
+                        && square.y >= crop.y
+                        && square.x + square.width <= crop.x + crop.width
+                        && square.y + square.height <= crop.y + crop.height
+                })
+            };
+            let all = squares(SIZE).into_iter().filter(inside);
+            let found: Vec<_> = all.map(|square| (square, law(look.view, &square, look.setting))).collect();
+            let worst = found.iter().map(|(_, ratio)| *ratio).fold(0.0, f64::max);
+            search.tell(Excess::new(worst), &found);
+        }
+        (looks, search)
+    }
+
+    fn enough(search: &Search) -> f64 {
+        let Next::Done(Ending::Found { enough, .. }) = search.tuning().next() else { panic!("{search:?}") };
+        enough
+    }
+
+    #[test]
+    fn the_whole_is_rendered_first_and_last_and_crops_in_between() {
+        // The lower right is the hardest
+        let law = |_: usize, square: &Tile, t: f64| {
+            let hard = square.x >= 500 && square.y >= 300;
+            (t / if hard { 0.004 } else { 0.1 }).powf(0.6)
+        };
+        let (looks, found) = search(1, 2, &law);
+        let rendered: Vec<_> = looks.iter().filter(|look| !look.is_rendered).collect();
+        let whole = |look: &Look| look.crop.is_none();
+        assert!(whole(rendered[0]) && whole(rendered[rendered.len() - 1]), "{looks:?}");
+        assert!(rendered.len() > 3 && rendered.iter().filter(|look| whole(look)).count() == 2, "{looks:?}");
+        // Cut from the first pictures
+        assert!(looks[1].is_rendered && looks[2].is_rendered && looks[1].setting == 0.2);
+        // The middle of one of the worst squares
+        let crop = looks[1].crop.unwrap();
+        assert!(crop.x >= 480 && (crop.y, crop.width, crop.height) == (256, CROP, CROP), "{crop:?}");
+        assert!(enough(&found) <= 0.004);
+    }
+
+    #[test]
+    fn what_is_enough_at_once_has_one_look() {
+        let (looks, found) = search(1, 4, &|_, _, t| t / 0.3);
+        assert_eq!((looks.len(), enough(&found)), (1, 0.2));
+    }
+
+    #[test]
+    fn a_place_that_gets_better_more_slowly_is_noticed_in_the_end() {
+        let law = |_: usize, square: &Tile, t: f64| {
+            // Hard at first, and hard to the end
+            if square.x < 64 {
+                9.0 * t / 0.2
+            } else if square.x >= 500 {
+                3.0 * (t / 0.2).powf(0.4)
+            } else {
+                0.1
+            }
+        };
+        let (looks, found) = search(1, 1, &law);
+        let last = looks[looks.len() - 1];
+        assert!(last.crop.is_none() && last.setting == enough(&found));
+        assert!(3.0 * (last.setting / 0.2).powf(0.4) <= 1.0, "{looks:?}");
+        assert!(looks.iter().any(|look| look.crop.is_some_and(|crop| crop.x >= 448)), "{looks:?}");
+    }
+
+    #[test]
+    fn an_earlier_search_goes_on_with_the_views_in_its_order() {
+        let mut tuning = Tuning::new(KNOB).unwrap();
+        tuning.tell(Excess { noise: 0.1, ..Excess::new(4.0) });
+        let mut search = Search::new(tuning, 3, 0).ordered(&[2, 7]);
+        assert_eq!(search.views(), [2, 0, 1]);
+        let look = search.next().unwrap();
+        assert!(look.view == 2 && look.setting < 0.2);
+        assert!(search.tell(Excess { noise: 0.05, ..Excess::new(2.0) }, &[]));
+        assert_eq!(search.tuning().steps()[1].excess.noise, 0.05);
+    }
+
+    #[test]
+    fn crops_are_a_small_part() {
+        for (size, crops) in [((240, 135), 0), ((480, 270), 1), ((960, 540), 4), ((1920, 1080), 4)] {
+            assert_eq!(crops_for(size), crops);
+            assert!(crops * CROP * CROP * 6 <= size.0 * size.1);
+        }
+        assert_eq!(crops_for((usize::MAX, 2)), 4);
+    }
+
+    proptest! {
+        /// Whatever gets better how fast in which place of which view: what is found is enough for the whole of each.
+        #[test]
+        fn what_is_found_is_enough_everywhere(
+            views in 1..4usize,
+            crops in 0..5usize,
+            hard in prop::collection::vec((0.1..12.0f64, 0.2..0.9f64), 40),
+        ) {
+            let law = |view: usize, square: &Tile, t: f64| {
+                let (excess, power) = hard[(7 * view + square.x / 100 + 11 * (square.y / 100)) % hard.len()];
+                excess * (t / 0.2).powf(2.0 * power)
+            };
+            let (_, found) = search(views, crops, &law);
+            let t = enough(&found);
+            for view in 0..views {
+                for square in squares(SIZE) {
+                    prop_assert!(law(view, &square, t) <= 1.0);
+                }
+            }
+        }
+    }
+}
