@@ -480,8 +480,8 @@ impl Tuning {
 
     /// How many times the effort comes next.
     fn step_from(&self, last: &Step) -> f64 {
-        // As far as pixels had the fewest samples at first, the next step does more than the last did
-        let answers = self.exponent().map_or(1.0, |exponent| exponent.clamp(HARDLY, 1.0));
+        // As far as pixels had the fewest samples at first, the next step does more than the last did: halfway to all
+        let answers = self.exponent().map_or(1.0, |exponent| exponent.clamp(HARDLY, 1.0).sqrt());
         let slope = self.slopes().last().map_or(NOISE, |(slope, times)| {
             let weight = times.ln().powi(2);
             (NOISE + weight * slope / answers) / (1.0 + weight)
@@ -513,16 +513,21 @@ impl Tuning {
         flat(last_two.next()) && flat(last_two.next())
     }
 
-    /// log(noise) over log(threshold) between neighbouring steps, the last ones first; `None` where noise is not known.
+    /// log(noise) over log(threshold) between each step and the last of those before it that is far enough from it, the last
+    /// steps first; `None` where noise is not known. Between thresholds that differ little nothing can be told: Cycles,
+    /// for one, looks at its threshold after every 16 samples.
     fn exponents(&self) -> impl Iterator<Item = Option<f64>> {
-        self.steps.windows(2).rev().map(|pair| {
-            let noise = pair[0].excess.noise / pair[1].excess.noise;
-            let exponent = noise.ln() / (pair[0].each / pair[1].each).ln();
+        (0..self.steps.len()).rev().map(|at| {
+            let (before, step) = (&self.steps[..at], &self.steps[at]);
+            let times = |before: &Step| before.each / step.each;
+            let before = before.iter().rev().find(|before| times(before).powi(2) >= EVIDENT)?;
+            let noise = before.excess.noise / step.excess.noise;
+            let exponent = noise.ln() / times(before).ln();
             (exponent.is_finite() && noise > 0.0).then_some(exponent)
         })
     }
 
-    /// That of the last two steps.
+    /// That of the last step.
     fn exponent(&self) -> Option<f64> {
         self.exponents().next().flatten()
     }

@@ -166,12 +166,13 @@ impl Search {
                 (self.places, self.purpose) = (seen.iter().map(|seen| seen.place).collect(), Purpose::Step);
             }
             Purpose::Step => {
-                // Another place says nothing of what the setting has changed
-                if self.told != Some(place) {
-                    excess.noise = 0.0;
-                    self.tuning.since = self.tuning.steps.len();
+                if self.told == Some(place) {
+                    self.tuning.tell(excess);
+                } else {
+                    // Another place says nothing of what the setting has changed
+                    self.tuning.tell(Excess { noise: 0.0, ..excess });
+                    self.tuning.since = self.tuning.steps.len() - 1;
                 }
-                self.tuning.tell(excess);
                 self.go_on(place, &seen);
                 let found = matches!(self.tuning.next(), Next::Done(Ending::Found { .. }));
                 if found && place.crop.is_some() {
