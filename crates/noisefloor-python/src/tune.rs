@@ -191,7 +191,7 @@ pub(crate) struct PyLook {
 /// hardest first, until one fails.
 ///
 /// size: (width, height) of each view, if the renderer can render a part of it. Then crops around the worst squares stand
-///     for a large picture, at most a sixth of its pixels, and the whole is looked at again in the end.
+///     for a large picture, at most a third of its pixels, and the whole is looked at again in the end.
 ///
 /// Raises ParameterError if the range is empty.
 #[pyclass(frozen, name = "Search", module = "noisefloor")]

@@ -232,10 +232,10 @@ impl Search {
     }
 }
 
-/// As many crops as stand for a picture of this size, if they are to have no more than a sixth of its pixels: 4 at most, 0
+/// As many crops as stand for a picture of this size, if they are to have no more than a third of its pixels: 4 at most, 0
 /// if it is small.
 pub fn crops_for((width, height): (usize, usize)) -> usize {
-    (width.saturating_mul(height) / (6 * CROP * CROP)).min(4)
+    (width.saturating_mul(height) / (3 * CROP * CROP)).min(4)
 }
 
 /// Those, each once, and then the others.
@@ -348,9 +348,9 @@ mod tests {
 
     #[test]
     fn crops_are_a_small_part() {
-        for (size, crops) in [((240, 135), 0), ((480, 270), 1), ((960, 540), 4), ((1920, 1080), 4)] {
+        for (size, crops) in [((240, 135), 0), ((320, 180), 1), ((480, 270), 2), ((960, 540), 4), ((1920, 1080), 4)] {
             assert_eq!(crops_for(size), crops);
-            assert!(crops * CROP * CROP * 6 <= size.0 * size.1);
+            assert!(crops * CROP * CROP * 3 <= size.0 * size.1);
         }
         assert_eq!(crops_for((usize::MAX, 2)), 4);
     }
