@@ -80,6 +80,8 @@ pub struct Search {
     views: Vec<usize>,
     /// The place whose noise the last step has told.
     told: Option<Place>,
+    /// The crops that stood for the whole, last.
+    stood: Vec<(usize, Tile)>,
 }
 
 impl Search {
@@ -89,7 +91,8 @@ impl Search {
         let purpose = if tuning.steps().is_empty() { Purpose::First } else { Purpose::Step };
         let views: Vec<usize> = (0..views.max(1)).collect();
         let places = views.iter().map(|&view| Place { view, crop: None }).collect();
-        Self { tuning, crops, purpose, places, seen: Vec::new(), views, told: None }.ordered(&[])
+        Self { tuning, crops, purpose, places, seen: Vec::new(), views, told: None, stood: Vec::new() }
+            .ordered(&[])
     }
 
     /// With these views first, hardest first, as an earlier search has found.
@@ -111,9 +114,9 @@ impl Search {
         &self.views
     }
 
-    /// The crops that stand for the whole, hardest first: view and place.
-    pub fn crops(&self) -> Vec<(usize, Tile)> {
-        self.places.iter().filter_map(|place| Some((place.view, place.crop?))).collect()
+    /// The crops that have stood for whole views, the last of them, hardest first: view and place.
+    pub fn crops(&self) -> &[(usize, Tile)] {
+        &self.stood
     }
 
     /// What to look at next; `None` at the end. The same until [`Search::tell`].
@@ -142,6 +145,10 @@ impl Search {
         }
         let mut seen = std::mem::take(&mut self.seen);
         seen.sort_by(|a, b| b.excess.ratio.total_cmp(&a.excess.ratio));
+        if place.crop.is_some() {
+            let seen = seen.iter().filter_map(|seen| Some((seen.place.view, seen.place.crop?)));
+            self.stood = first(seen, &self.parts());
+        }
         self.views = first(seen.iter().map(|seen| seen.place.view), &self.views);
         let Seen { place, mut excess, .. } = seen[0];
         match self.purpose {
@@ -196,6 +203,10 @@ impl Search {
     fn go_on(&mut self, told: Place, seen: &[Seen]) {
         self.places = first(seen.iter().map(|seen| seen.place), &self.places);
         (self.told, self.purpose) = (Some(told), Purpose::Step);
+    }
+
+    fn parts(&self) -> Vec<(usize, Tile)> {
+        self.places.iter().filter_map(|place| Some((place.view, place.crop?))).collect()
     }
 
     fn whole(&self) -> Vec<Place> {
@@ -348,7 +359,9 @@ mod tests {
 
     #[test]
     fn crops_are_a_small_part() {
-        for (size, crops) in [((240, 135), 0), ((320, 180), 1), ((480, 270), 2), ((960, 540), 4), ((1920, 1080), 4)] {
+        for (size, crops) in
+            [((240, 135), 0), ((320, 180), 1), ((480, 270), 2), ((960, 540), 4), ((1920, 1080), 4)]
+        {
             assert_eq!(crops_for(size), crops);
             assert!(crops * CROP * CROP * 3 <= size.0 * size.1);
         }

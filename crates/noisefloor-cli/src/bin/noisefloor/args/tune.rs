@@ -40,7 +40,7 @@ use std::path::PathBuf;
   noisefloor tune shot.blend --source cycles --fps 24         for the frames of a film
   noisefloor tune hall/scene.xml --source mitsuba             samples per pixel
   noisefloor tune 'walk.{frame:04}.xml' --frames 1,50,120     one setting for a sequence
-  noisefloor tune shot.blend --source cycles --regions 4      only the four worst places, after a first look
+  noisefloor tune shot.blend --source cycles --regions 4      first the whole, then its worst places
   noisefloor tune --source 'command: myrender {scene} --noise {threshold} --seed {seed} -o {out}.exr' hall.ass
   noisefloor tune cornell-box --size 192x192 --keep out/tuned --json")]
 pub struct TuneArgs {
@@ -80,8 +80,8 @@ pub struct TuneArgs {
     /// All are rendered with the first setting, then the worst first, until one fails.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     frames: Vec<u32>,
-    /// Render the whole picture only with the first setting, and then this many crops of 128 pixels around what was worst:
-    /// for large pictures.
+    /// Render the whole picture only with the first setting and in the end, and in between this many crops of 128 pixels around
+    /// what was worst: for large pictures.
     #[arg(long, value_name = "COUNT", conflicts_with = "keep", value_parser = clap::value_parser!(u64).range(1..=64))]
     regions: Option<u64>,
     /// Print JSON instead of lines.
