@@ -877,7 +877,7 @@ class Settings(unittest.TestCase):
         self.assertEqual([view for view, _ in whole], [0, 1, 1, 0])
         crops = [look for look in looks if look.crop]
         self.assertTrue(crops[0].is_rendered and not crops[-1].is_rendered)
-        self.assertTrue(all(look.view == 1 and look.crop[0] >= 352 and look.crop[2:] == (128, 128) for look in crops))
+        self.assertTrue(all(look.view == 1 and look.crop[0] >= 256 and look.crop[2:] == (128, 128) for look in crops), crops)
         self.assertLessEqual(search.steps[-1][1], 1)
 
     def test_denoised_pictures_are_judged_by_what_they_have_lost(self):
