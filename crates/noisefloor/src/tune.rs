@@ -46,6 +46,9 @@ const NOISE: f64 = 0.5;
 /// Slopes that are believed. What denoisers leave falls by 0.3 to 0.7 (`docs/denoising.md`); JODs of strong
 /// noise, which saturate, by less.
 const SLOPES: (f64, f64) = (0.15, 1.0);
+/// A closer look may find this much more, and the setting that is enough follows from what falls so slowly, at the least.
+const NEAR: f64 = 1.1;
+const SLOW: f64 = 0.25;
 /// A step makes at least this many times the effort, and none more than [`LEAP`]: a coarse picture does not
 /// know the light that it has not met, and a step too far cannot be taken back.
 const LEAST_STEP: f64 = 1.25;
@@ -375,7 +378,8 @@ pub enum Ending {
         /// The setting that is just enough: the one tried last, or between that and the one before, if that
         /// was far more than enough.
         setting: f64,
-        /// The setting tried last, which was enough.
+        /// The setting tried last, which was enough; or `setting` itself, if [`Tuning::correct`] has said that the last one
+        /// was not by up to a tenth.
         enough: f64,
         /// The coarser one tried before, which was not; `None` if the coarsest of all is enough.
         too_coarse: Option<f64>,
@@ -402,6 +406,8 @@ pub struct Tuning {
     steps: Vec<Step>,
     /// The first step whose ratio can be compared with those after it: since then, the place has been the same.
     since: usize,
+    /// Of the last step, a closer look was taken.
+    is_corrected: bool,
 }
 
 impl Tuning {
@@ -411,7 +417,7 @@ impl Tuning {
     /// [`KnobError`] if the range is empty.
     pub fn new(knob: Knob) -> Result<Self, KnobError> {
         knob.check()?;
-        Ok(Self { knob, steps: Vec::new(), since: 0 })
+        Ok(Self { knob, steps: Vec::new(), since: 0, is_corrected: false })
     }
 
     /// What is searched.
@@ -433,6 +439,13 @@ impl Tuning {
             return Next::Done(ending);
         }
         let (ratio, passes) = (last.excess.ratio, last.excess.ratio <= 1.0);
+        if self.is_corrected && !passes && ratio <= NEAR {
+            let effort = self.knob.effort(last.setting) * (ratio / CLAIMED).powf(1.0 / SLOW);
+            let setting = self.knob.setting(effort);
+            if setting != self.knob.finest() {
+                return Next::Done(Ending::Found { setting, enough: setting, too_coarse: Some(last.setting) });
+            }
+        }
         let alike = self.steps.iter().rev().take_while(|step| step.draws_as(last)).count();
         // Two pictures of the fewest samples may pass together where one does not
         if alike > if passes { UNGOVERNED - 1 } else { UNCHANGED } {
@@ -462,15 +475,18 @@ impl Tuning {
     pub fn tell(&mut self, excess: Excess) {
         if let Next::Render { each, setting } = self.next() {
             self.steps.push(Step { setting, each, excess });
+            self.is_corrected = false;
         }
     }
 
     /// Says what a closer look at the last setting has found, such as at the whole picture where a part of it was judged:
-    /// another ratio. Before the first step, nothing happens.
+    /// another ratio. If it is up to a tenth too high, a setting is named that is a little finer, and nothing is rendered once
+    /// more. Before the first step, nothing happens.
     pub fn correct(&mut self, ratio: f64) {
         if let Some(last) = self.steps.last_mut() {
             last.excess.ratio = Excess::new(ratio).ratio;
             self.since = self.steps.len() - 1;
+            self.is_corrected = true;
         }
     }
 
@@ -715,6 +731,11 @@ mod tests {
         // The whole is a little worse: less is claimed
         tuning.correct(0.97);
         assert!(matches!(tuning.next(), Next::Done(Ending::Found { setting, .. }) if setting == enough));
+        // Up to a tenth too much is made good without another picture, even if it falls slowly
+        tuning.correct(1.08);
+        let Next::Done(Ending::Found { setting: finer, too_coarse, .. }) = tuning.next() else { panic!() };
+        let effort = THRESHOLD.effort(finer) / THRESHOLD.effort(enough);
+        assert!(1.08 * effort.powf(-0.25) < 1.0 && effort < 1.6 && too_coarse == Some(enough), "{effort}");
         tuning.correct(1.3);
         let Next::Render { setting, .. } = tuning.next() else { panic!() };
         assert!(setting < enough);

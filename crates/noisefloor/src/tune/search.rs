@@ -1,6 +1,6 @@
 //! A search over several pictures, or over parts of large ones.
 
-use super::{Ending, Excess, Next, Tuning};
+use super::{Ending, Excess, NEAR, Next, Tuning};
 use crate::tile::Tile;
 
 /// Edge of crops, in pixels: a square that is judged, and half of one around it.
@@ -139,8 +139,13 @@ impl Search {
         let Some(look) = self.next() else { return true };
         let place = Place { view: look.view, crop: look.crop };
         self.seen.push(Seen { place, excess, squares: squares.to_vec() });
-        let all = matches!(self.purpose, Purpose::First | Purpose::Closer { .. });
-        if self.seen.len() < self.places.len() && (all || excess.ratio <= 1.0) {
+        // How bad a place is before the others need no look
+        let fails = match self.purpose {
+            Purpose::First | Purpose::Closer { .. } => f64::INFINITY,
+            Purpose::Step => 1.0,
+            Purpose::Again => NEAR,
+        };
+        if self.seen.len() < self.places.len() && excess.ratio <= fails {
             return false;
         }
         let mut seen = std::mem::take(&mut self.seen);
