@@ -443,7 +443,11 @@ impl Tuning {
             let effort = self.knob.effort(last.setting) * (ratio / CLAIMED).powf(1.0 / SLOW);
             let setting = self.knob.setting(effort);
             if setting != self.knob.finest() {
-                return Next::Done(Ending::Found { setting, enough: setting, too_coarse: Some(last.setting) });
+                return Next::Done(Ending::Found {
+                    setting,
+                    enough: setting,
+                    too_coarse: Some(last.setting),
+                });
             }
         }
         let alike = self.steps.iter().rev().take_while(|step| step.draws_as(last)).count();
