@@ -183,8 +183,8 @@ def plot(args):
     scenes = {}
     for row in csv.DictReader(open(args.rows)):
         scenes.setdefault(row["scene"], []).append(row)
-    across = 4
-    figure, panels = pyplot.subplots(-(-len(scenes) // across), across, figsize=(10, 2.7 * -(-len(scenes) // across)), squeeze=False)
+    across = min(len(scenes), 5)
+    figure, panels = pyplot.subplots(-(-len(scenes) // across), across, figsize=(11, 2.7 * -(-len(scenes) // across)), squeeze=False)
     for panel, (scene, rows) in itertools.zip_longest(panels.flat, scenes.items(), fillvalue=(None, [])):
         if scene is None:
             panel.axis("off")
