@@ -569,6 +569,29 @@ class Addon(unittest.TestCase):
         self.assertIn("at 24 frames a second", hooks.state.summary)
         self.assertGreater(scene.cycles.adaptive_threshold, found)
 
+    def test_crops_stand_for_a_large_picture_between_two_looks_at_the_whole(self):
+        scene = room(closed=True)
+        scene.cycles.samples, scene.noisefloor.people = 4096, 0.5
+        scene.render.resolution_x, scene.render.resolution_y = 256, 200
+        seen, before = [], facts(scene)
+
+        def record(scene, *_):
+            shot = scene.render
+            wide = round(256 * (shot.border_max_x - shot.border_min_x)) if shot.use_border else 256
+            seen.append((wide, shot.use_persistent_data))
+
+        bpy.app.handlers.render_pre.append(record)
+        try:
+            self.assertEqual(bpy.ops.render.noisefloor_threshold(), {"FINISHED"})
+        finally:
+            bpy.app.handlers.render_pre.remove(record)
+        widths = [wide for wide, _ in seen]
+        self.assertEqual((widths[:2], set(widths[2:-2]), widths[-2:]), ([256] * 2, {128}, [256] * 2))
+        self.assertTrue(all(persistent for _, persistent in seen))
+        after = facts(scene)
+        changed = {key for key in before if before[key] != after[key]}
+        self.assertLessEqual(changed, {("cycles", "adaptive_threshold"), ("cycles", "use_adaptive_sampling")})
+
     def test_a_search_that_finds_nothing_says_why(self):
         scene = room(closed=True)
         # So few samples that no threshold is reached

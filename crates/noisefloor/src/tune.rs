@@ -186,7 +186,8 @@ pub struct Excess {
     /// A number that follows from the pictures, the same for the same pictures; 0 if it is not known.
     pub pictures: u64,
     /// The noise of each picture, in a unit that is the same in all steps; 0 if it is not known. By it, a search notices
-    /// thresholds that do not change the noise, and without it trusts that they do.
+    /// thresholds that do not change the noise, and without it trusts that they do. A step of unknown noise after others whose
+    /// noise is known is of another place, and is not compared with them.
     pub noise: f64,
 }
 
@@ -439,7 +440,8 @@ impl Tuning {
             return Next::Done(ending);
         }
         let (ratio, passes) = (last.excess.ratio, last.excess.ratio <= 1.0);
-        if self.is_corrected && !passes && ratio <= NEAR {
+        // Where thresholds hardly change the noise, a little finer is not a little better
+        if self.is_corrected && !passes && ratio * self.worse_alone().unwrap_or(f64::INFINITY) <= NEAR {
             let effort = self.knob.effort(last.setting) * (ratio / CLAIMED).powf(1.0 / SLOW);
             let setting = self.knob.setting(effort);
             if setting != self.knob.finest() {
@@ -478,6 +480,9 @@ impl Tuning {
     /// What was found with the setting that [`Tuning::next`] named; without one, nothing happens.
     pub fn tell(&mut self, excess: Excess) {
         if let Next::Render { each, setting } = self.next() {
+            if excess.noise == 0.0 && self.steps.iter().any(|step| step.excess.noise > 0.0) {
+                self.since = self.steps.len();
+            }
             self.steps.push(Step { setting, each, excess });
             self.is_corrected = false;
         }
@@ -552,16 +557,27 @@ impl Tuning {
         self.exponents().next().flatten()
     }
 
+    /// How many times worse one picture may be than the mean of two coarser ones, beyond what is tolerated ([`GOVERNS`]); `None`
+    /// if only one step tells its noise, and nothing is known of that.
+    fn worse_alone(&self) -> Option<f64> {
+        if matches!(self.knob, Knob::Samples { .. }) {
+            return Some(1.0);
+        }
+        // One has 2^((1 − exponent)/2) times the noise
+        let times = |exponent: f64| ((GOVERNS - exponent) / 2.0).exp2().max(1.0);
+        let trusts = || {
+            let mut last = self.steps.iter().rev();
+            last.next().is_some_and(|step| step.excess.noise == 0.0)
+                || last.next().is_some_and(|step| step.excess.noise == 0.0)
+        };
+        self.exponents().flatten().next().map(times).or_else(|| trusts().then_some(1.0))
+    }
+
     /// What is claimed if the mean of the last two pictures passes; `None` if one picture with a finer threshold may be worse.
     fn found(&self, last: &Step) -> Option<Ending> {
         let coarser = self.steps.iter().rev().nth(1);
-        let threshold = matches!(self.knob, Knob::Threshold { .. });
-        // One picture has 2^((1 − exponent)/2) times the noise of the mean of two coarser ones
-        let governs = match self.exponents().flatten().next() {
-            Some(exponent) => last.excess.ratio * ((GOVERNS - exponent) / 2.0).exp2() <= 1.0,
-            None => last.excess.noise == 0.0 || coarser.is_some_and(|step| step.excess.noise == 0.0),
-        };
-        if threshold && !governs {
+        let governs = self.worse_alone().is_some_and(|times| last.excess.ratio * times <= 1.0);
+        if !governs {
             // One of the two is worse than their mean, by the root of two at the most
             let single = last.excess.ratio * std::f64::consts::SQRT_2 <= 1.0;
             let setting = self.knob.setting(self.knob.effort(last.each));
@@ -743,6 +759,19 @@ mod tests {
         tuning.correct(1.3);
         let Next::Render { setting, .. } = tuning.next() else { panic!() };
         assert!(setting < enough);
+    }
+
+    /// A finer threshold that is not tried is not claimed where thresholds do not change the noise.
+    #[test]
+    fn a_closer_look_at_the_fewest_samples_is_followed_by_pictures() {
+        let mut tuning = Tuning::new(THRESHOLD).unwrap();
+        for (ratio, noise) in [(1.5, 0.1), (0.6, 0.099)] {
+            tuning.tell(Excess { noise, ..Excess::new(ratio) });
+        }
+        // One picture passes
+        assert!(matches!(tuning.next(), Next::Done(Ending::Found { .. })));
+        tuning.correct(1.05);
+        assert!(matches!(tuning.next(), Next::Render { .. }), "{:?}", tuning.next());
     }
 
     /// As Cycles, which draws the same pictures then.

@@ -16,6 +16,8 @@ ENDINGS = {
     "unchanged": "a finer threshold changes nothing: Max Samples is reached first, raise it",
     "not-falling": "more samples do not help: what is wrong is no noise",
 }
+# As many as noisefloor.Search asks for at the most
+CROPS = 4
 BORDER = ["use_border", "use_crop_to_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y"]
 
 
@@ -44,7 +46,8 @@ class Search:
             views=len(self.frames),
             size=None if shot.use_border else self.size,
         )
-        # What is rendered next, the whole pictures of frames that crops may be cut from, and seconds of whole pictures
+        # What is rendered next; how hard the hardest frames are, with the whole pictures that crops may be cut from; and
+        # seconds of whole pictures
         self.look, self.whole, self.pictures, self.begun, self.seconds = self.search.next(), {}, [], 0.0, []
         # Cycles loads the scene once for all of them
         self.borrowed, self.persistent = [], shot.use_persistent_data
@@ -109,13 +112,17 @@ class Search:
         if len(self.pictures) < 2:
             return
         pictures, self.pictures = self.pictures, []
+        excess = self.judge.excess(pictures)
         if self.look.crop is None:
-            self.whole[self.look.view] = pictures
-        self.search.tell(self.judge.excess(pictures))
+            self.whole[self.look.view] = excess.ratio, pictures
+            # So many crops lie in so many frames at the most
+            if len(self.whole) > CROPS:
+                del self.whole[min(self.whole, key=lambda view: self.whole[view][0])]
+        self.search.tell(excess)
         while (look := self.search.next()) and look.is_rendered:
             x, y, width, height = look.crop
             here = slice(y, y + height), slice(x, x + width)
-            cut = [{name: each[here] for name, each in picture.items()} for picture in self.whole[look.view]]
+            cut = [{name: each[here] for name, each in picture.items()} for picture in self.whole[look.view][1]]
             self.search.tell(self.judge.excess(cut))
         if look is None or look.crop or look.each != self.look.each:
             self.whole = {}

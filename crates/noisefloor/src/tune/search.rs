@@ -178,13 +178,11 @@ impl Search {
                 (self.places, self.purpose) = (seen.iter().map(|seen| seen.place).collect(), Purpose::Step);
             }
             Purpose::Step => {
-                if self.told == Some(place) {
-                    self.tuning.tell(excess);
-                } else {
-                    // Another place says nothing of what the setting has changed
-                    self.tuning.tell(Excess { noise: 0.0, ..excess });
-                    self.tuning.since = self.tuning.steps.len() - 1;
+                // Another place says nothing of what the setting has changed
+                if self.told != Some(place) {
+                    excess.noise = 0.0;
                 }
+                self.tuning.tell(excess);
                 self.go_on(place, &seen);
                 let found = matches!(self.tuning.next(), Next::Done(Ending::Found { .. }));
                 if found && place.crop.is_some() {
@@ -295,7 +293,7 @@ mod tests {
             let all = squares(SIZE).into_iter().filter(inside);
             let found: Vec<_> = all.map(|square| (square, law(look.view, &square, look.setting))).collect();
             let worst = found.iter().map(|(_, ratio)| *ratio).fold(0.0, f64::max);
-            search.tell(Excess::new(worst), &found);
+            search.tell(Excess { noise: look.each, ..Excess::new(worst) }, &found);
         }
         (looks, search)
     }
@@ -387,6 +385,16 @@ mod tests {
             };
             let (_, found) = search(views, crops, &law);
             let t = enough(&found);
+            if crops == 0 {
+                // What was told can be told again, as when a search is resumed
+                let mut again = Tuning::new(KNOB).unwrap();
+                for step in found.tuning().steps() {
+                    let Next::Render { setting, .. } = again.next() else { panic!("{again:?}") };
+                    prop_assert_eq!(setting, step.setting);
+                    again.tell(step.excess);
+                }
+                prop_assert_eq!(again.next(), found.tuning().next());
+            }
             for view in 0..views {
                 for square in squares(SIZE) {
                     prop_assert!(law(view, &square, t) <= 1.0);

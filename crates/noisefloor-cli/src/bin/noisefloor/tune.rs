@@ -91,7 +91,7 @@ struct Report {
     knob: &'static str,
     /// Null if none was found.
     setting: Option<f64>,
-    /// The setting tried last, and the one before, which was too coarse.
+    /// As [`Ending::Found`] has them.
     enough: Option<f64>,
     too_coarse: Option<f64>,
     ending: &'static str,
@@ -150,8 +150,9 @@ struct Tune<'a> {
     judges: Judges<'a>,
     identity: Vec<SourceIdentity>,
     rows: Vec<Row>,
-    /// Of the looks since the last row: whole pictures, of which crops may be wanted, and the times.
-    whole: Vec<(usize, Pair)>,
+    /// Whole pictures since the last row, of which crops may be wanted: of the hardest views, how hard first.
+    whole: Vec<(f64, usize, Pair)>,
+    /// Of the looks since the last row: the worst, and the times.
     worst: Option<(Look, Judged)>,
     rendering: Duration,
     judging: Duration,
@@ -217,23 +218,27 @@ impl<'a> Tune<'a> {
         }
         let bar = spinner(job.quiet, format!("{what}: two pictures"));
         let start = Instant::now();
-        let rendered = self.whole.iter().find(|(number, _)| look.is_rendered && *number == look.view);
+        let rendered = self.whole.iter().find(|(_, number, _)| look.is_rendered && *number == look.view);
         let pair = match (rendered, look.crop) {
-            (Some((_, whole)), Some(crop)) => whole.cropped(crop),
+            (Some((.., whole)), Some(crop)) => whole.cropped(crop),
             _ => view.pictures.pair(look.each, look.crop, &bar)?,
         };
         self.rendering += start.elapsed();
         bar.set_message(format!("{what}: judging"));
         let start = Instant::now();
-        if look.crop.is_none() && job.regions > 0 {
-            self.whole.push((look.view, pair.clone()));
-        }
+        let whole = (look.crop.is_none() && job.regions > 0).then(|| pair.clone());
         let crop = look.crop.zip(self.tones[look.view].clone()).map(|(tile, tone)| Crop { tile, tone });
         let judged = self.judges.judge(pair, view.guides.as_ref(), crop.as_ref())?;
         self.judging += start.elapsed();
         bar.finish_and_clear();
         if look.crop.is_none() {
             self.tones[look.view] = Some(self.judges.tone(&judged));
+        }
+        if let Some(whole) = whole {
+            // So many crops lie in so many views at the most, which are the worst
+            self.whole.push((judged.excess.ratio, look.view, whole));
+            self.whole.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
+            self.whole.truncate(job.regions);
         }
         let done = self.search.tell(judged.excess, &judged.squares);
         let worse = |worst: &(Look, Judged)| judged.excess.ratio > worst.1.excess.ratio;
