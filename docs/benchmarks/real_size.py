@@ -29,7 +29,8 @@ import numpy as np
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import at_the_stop as shown  # noqa: E402
 
-UNIFORM = (32, 64, 128, 256, 512)
+# Numbers of samples for all pixels; of a scene, up to half of its reference's
+UNIFORM = tuple(32 << power for power in range(8))
 EDGE = 64
 
 
@@ -44,7 +45,7 @@ def jobs(args):
     uniform = lambda spp: [*oidn, "--min-spp", str(spp), "--max-spp", str(spp)]
     needed = {
         "oracle-denoised": oidn,
-        **{f"uniform-{spp}": uniform(spp) for spp in UNIFORM},
+        **{f"uniform-{spp}": uniform(spp) for spp in UNIFORM if 2 * spp <= args.reference},
         "reference": [*uniform(many), "--seed", "77"],
     }
     more = {"oracle-denoised-2": [*oidn, "--seed", "2"], "oracle": ["--max-spp", str(args.reference // 2)]}

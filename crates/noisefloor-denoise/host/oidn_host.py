@@ -1,6 +1,6 @@
 """Serves Open Image Denoise (the package mitsuba-oidn, which has the library and its weights) to noisefloor-denoise.
 
-Pictures: "radiance", linear and not negative; optionally "albedo" in [0, 1], and with it "normal" in [-1, 1]. Runs on the CPU,
+Pictures: "radiance", linear and not negative, scaled so that the network sees it as it is; optionally "albedo" in [0, 1], and with it "normal" in [-1, 1]. Runs on the CPU,
 with a number of threads that depends on the size of the picture alone: the last bits of its results depend on it. Processors
 with other instructions may round otherwise, too.
 """
@@ -58,7 +58,7 @@ class Oidn:
             device.set_bool("setAffinity", False)
             device.commit()
             filter = device.new_filter("RT")
-            filter.hdr, filter.quality = True, self.oidn.Quality.High
+            filter.hdr, filter.quality, filter.input_scale = True, self.oidn.Quality.High, 1.0
             self.filters[slot] = what, filter
         return filter
 

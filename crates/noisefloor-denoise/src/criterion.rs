@@ -1,7 +1,8 @@
 //! A limit on what people would see of the error of the denoised picture, as a stopping criterion.
 
-use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture};
+use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture, cut};
 use crate::estimate::{DenoisedError, DenoisedHalves};
+use crate::parts::{holds, parts_around, whole, within};
 use crate::record::DenoisedRecord;
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
@@ -46,7 +47,8 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 /// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
 /// they are given. [`DenoisedRecord::compose`] shows such tiles as they were rendered.
 ///
-/// A verdict takes two denoisings of the whole picture: use a schedule with growing intervals, such as
+/// A verdict takes two denoisings, of the whole picture or, where the denoiser can do that, of what lies around open tiles: use a
+/// schedule with growing intervals, such as
 /// [`Schedule::Growing`](noisefloor::Schedule::Growing).
 ///
 /// Nobody has been asked about denoised tiles: the threshold is the vision model's, which was fitted to
@@ -78,18 +80,27 @@ impl<D: Denoiser> DenoisedQuality<D> {
         Arc::clone(&self.record)
     }
 
-    fn estimate(&mut self, view: &View<'_>) -> Result<DenoisedError, DenoiseError> {
-        let grid = view.film.grid();
-        let size = (grid.width(), grid.height());
-        let [a, b] = film_halves(view.film);
+    /// The error in each of these rectangles of the picture.
+    fn estimate(&mut self, view: &View<'_>, parts: &[Tile]) -> Result<Vec<PartError>, CriterionError> {
+        let size = view.film.grid().size();
+        let halves = film_halves(view.film);
         let wants = self.denoiser.wants();
-        let mut pictures = [&a, &b].map(|half| NoisyPicture::new(size, half));
+        let mut pictures = halves.each_ref().map(|half| NoisyPicture::new(size, half));
         if let Some(guides) = &self.guides {
             let guided = pictures.iter_mut().zip(guides.iter());
             guided.for_each(|(picture, guide)| *picture = picture.guided(guide, wants));
         }
-        let [da, db] = self.denoiser.denoise_both(pictures.each_ref())?;
-        DenoisedError::new(&DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] }, view.display)
+        let made = self.denoiser.denoise_parts(pictures.each_ref(), parts);
+        let errors = made.and_then(|made| {
+            let errors = parts.iter().zip(&made).map(|(&part, [da, db])| {
+                let [a, b] = halves.each_ref().map(|half| cut(half, size.0, part));
+                let size = (part.width, part.height);
+                let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [da, db] };
+                Ok((part, DenoisedError::new(&halves, view.display)?))
+            });
+            errors.collect()
+        });
+        errors.map_err(|error| self.failed(&error))
     }
 
     fn failed(&self, error: &DenoiseError) -> CriterionError {
@@ -132,20 +143,23 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let began = Instant::now();
-        let error = self.estimate(view).map_err(|error| self.failed(&error))?;
+        let all = whole(view.film.grid().size());
+        let parts = parts_around(tiles, view.film.grid().size());
+        let errors = self.estimate(view, &parts)?;
+        // Reports are of the whole picture, at which a render that was resumed may not look again
+        let unknown = self.record.lock().unwrap_or_else(PoisonError::into_inner).error.is_none();
+        let all_errors = if unknown && parts != [all] { self.estimate(view, &[all])? } else { Vec::new() };
         let eyes = VisionModel::new(&view.viewing);
+        let limit = self.lost / ESTIMATE_ERRS_BY;
         let judged: Vec<Judged> = tiles
             .par_iter()
-            .map_init(VisionWorkspace::default, |room, tile| {
-                judge_tile(
-                    view,
-                    &error,
-                    *tile,
-                    self.lost / ESTIMATE_ERRS_BY,
-                    &mut Eyes { model: &eyes, room },
-                )
+            .map_init(VisionWorkspace::default, |room, &tile| {
+                let eyes = &mut Eyes { model: &eyes, room };
+                let here = errors.iter().find(|(part, _)| holds(*part, tile));
+                here.map(|here| judge_tile(view, here, tile, limit, eyes))
             })
-            .collect();
+            .collect::<Option<_>>()
+            .expect("each tile is in a part");
 
         let count = view.film.grid().len();
         let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
@@ -155,7 +169,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             record.jods_lost[tile.index] = judged.lost;
             record.undenoised[tile.index] = judged.undenoised;
         }
-        record.error = Some(error);
+        all_errors.into_iter().chain(errors).for_each(|error| record.renew(error, tiles));
         record.seconds += began.elapsed().as_secs_f64();
         record.verdicts += 1;
         Ok(judged.into_iter().map(|judged| judged.verdict).collect())
@@ -172,6 +186,9 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         true
     }
 }
+
+/// The error in a rectangle of the picture.
+pub(crate) type PartError = (Tile, DenoisedError);
 
 /// What is found of a tile.
 struct Judged {
@@ -219,15 +236,22 @@ impl Eyes<'_> {
     }
 }
 
-fn judge_tile(view: &View<'_>, error: &DenoisedError, tile: Tile, limit: f64, eyes: &mut Eyes<'_>) -> Judged {
+fn judge_tile(
+    view: &View<'_>,
+    (part, error): &PartError,
+    tile: Tile,
+    limit: f64,
+    eyes: &mut Eyes<'_>,
+) -> Judged {
     let (film, spp) = (view.film, view.film.spp(tile.index));
     let evidence = film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
-    let (here, lost) = judged_by(error, tile, limit, eyes);
+    let place = within(tile, *part);
+    let (here, lost) = judged_by(error, place, limit, eyes);
     if lost <= limit {
         return Judged { verdict: Verdict::new(evidence).expecting(Some(spp)), lost, undenoised: false };
     }
     // What a denoiser smears however many samples it gets is done when the noise is: no tile takes more samples denoised
-    let noise = noise_of(film, view.display, tile, error.part(tile).shown().to_vec());
+    let noise = noise_of(film, view.display, tile, error.part(place).shown().to_vec());
     let of_noise = eyes.lost(&noise, 1.0);
     if of_noise <= limit {
         let verdict = Verdict::new(evidence).expecting(Some(spp));

@@ -1,7 +1,7 @@
 //! What a denoiser is.
 
 use auto_impl::auto_impl;
-use noisefloor::{Rgb, source::FirstHits};
+use noisefloor::{Rgb, Tile, source::FirstHits};
 use std::error::Error;
 use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
@@ -110,6 +110,31 @@ pub trait Denoiser {
         let [a, b] = pictures;
         Ok([self.denoise(a)?, self.denoise(b)?])
     }
+
+    /// What [`denoise_both`](Self::denoise_both) makes, but only in `parts`, rectangles within the pictures: of each part, its
+    /// pixels in both pictures, row-major. Parts come out as in the whole, up to far less than noise.
+    ///
+    /// Denoises everything and cuts the parts out, unless an implementer knows how much around a part has a say in it.
+    ///
+    /// # Errors
+    /// As for one.
+    fn denoise_parts(
+        &mut self,
+        pictures: [&NoisyPicture<'_>; 2],
+        parts: &[Tile],
+    ) -> Result<Vec<[Vec<Rgb>; 2]>, DenoiseError> {
+        let width = pictures[0].size.0;
+        let made = self.denoise_both(pictures)?;
+        Ok(parts.iter().map(|&part| made.each_ref().map(|made| cut(made, width, part))).collect())
+    }
+}
+
+/// A rectangle of a plane that is `width` pixels wide; of an empty one, nothing.
+pub(crate) fn cut<T: Copy>(plane: &[T], width: usize, part: Tile) -> Vec<T> {
+    if plane.is_empty() {
+        return Vec::new();
+    }
+    part.rows(width).flat_map(|row| &plane[row]).copied().collect()
 }
 
 /// One denoiser for a criterion and for whoever writes the picture.
@@ -128,5 +153,13 @@ impl<D: Denoiser> Denoiser for Arc<Mutex<D>> {
 
     fn denoise_both(&mut self, pictures: [&NoisyPicture<'_>; 2]) -> Result<[Vec<Rgb>; 2], DenoiseError> {
         self.lock().unwrap_or_else(PoisonError::into_inner).denoise_both(pictures)
+    }
+
+    fn denoise_parts(
+        &mut self,
+        pictures: [&NoisyPicture<'_>; 2],
+        parts: &[Tile],
+    ) -> Result<Vec<[Vec<Rgb>; 2]>, DenoiseError> {
+        self.lock().unwrap_or_else(PoisonError::into_inner).denoise_parts(pictures, parts)
     }
 }

@@ -25,7 +25,8 @@
 use crate::bands::Plane;
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::criterion::ESTIMATE_ERRS_BY;
-use crate::denoiser::DenoiseError;
+use crate::denoiser::{DenoiseError, cut};
+use crate::parts::within;
 use noisefloor::tune::{Excess, squares};
 use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes};
 use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorkspace};
@@ -206,18 +207,25 @@ impl DenoisedError {
 
     /// A tile of it, alone.
     pub(crate) fn part(&self, tile: Tile) -> Self {
-        let pixels = || tile.rows(self.size.0).flatten();
-        let crop = |plane: &[f32]| pixels().map(|pixel| plane[pixel]).collect();
-        let (shown, residual) = (crop(&self.shown), crop(&self.residual));
-        let standing = if self.standing.is_empty() { Vec::new() } else { crop(&self.standing) };
-        let light = pixels().filter_map(|pixel| self.light.get(pixel).copied()).collect();
+        let width = self.size.0;
         Self {
             size: (tile.width, tile.height),
-            shown,
-            residual,
-            standing,
-            light,
+            shown: cut(&self.shown, width, tile),
+            residual: cut(&self.residual, width, tile),
+            standing: cut(&self.standing, width, tile),
+            light: cut(&self.light, width, tile),
             display: self.display.clone(),
+        }
+    }
+
+    /// Takes over what a newer estimate, of the rectangle `part`, says of `tile` in it.
+    pub(crate) fn renew(&mut self, tile: Tile, newer: &Self, part: Tile) {
+        let (own, from) = (tile.rows(self.size.0), within(tile, part).rows(part.width));
+        for (own, from) in own.zip(from) {
+            self.shown[own.clone()].copy_from_slice(&newer.shown[from.clone()]);
+            self.residual[own.clone()].copy_from_slice(&newer.residual[from.clone()]);
+            self.standing[own.clone()].copy_from_slice(&newer.standing[from.clone()]);
+            self.light[own].copy_from_slice(&newer.light[from]);
         }
     }
 

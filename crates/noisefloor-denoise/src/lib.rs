@@ -45,6 +45,7 @@ mod denoiser;
 mod estimate;
 #[cfg(feature = "oidn")]
 mod oidn;
+mod parts;
 mod record;
 
 pub use criterion::{

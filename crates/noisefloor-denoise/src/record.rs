@@ -1,12 +1,14 @@
 //! What is known of the verdicts on denoised pictures besides the verdicts.
 
+use crate::criterion::PartError;
 use crate::estimate::DenoisedError;
-use noisefloor::{Rgb, TileGrid};
+use crate::parts::holds;
+use noisefloor::{Rgb, Tile, TileGrid};
 
 /// What the last verdicts looked at, for reports.
 #[derive(Clone, Debug, Default)]
 pub struct DenoisedRecord {
-    /// The error of the denoised picture at the last verdict.
+    /// The error of the denoised picture when each tile was last judged.
     pub error: Option<DenoisedError>,
     /// For each tile, the just-objectionable differences lost when it was last judged, by a small tile those of the square
     /// around it where these are fewer; NaN before that.
@@ -28,6 +30,17 @@ impl DenoisedRecord {
             if let (Some(to), Some(from)) = (denoised.get_mut(row.clone()), rendered.get(row)) {
                 to.copy_from_slice(from);
             }
+        }
+    }
+
+    /// Takes over what is known of a rectangle of the picture, where these tiles are.
+    pub(crate) fn renew(&mut self, (part, newer): PartError, tiles: &[Tile]) {
+        match &mut self.error {
+            Some(error) if error.size() != newer.size() => {
+                let judged = tiles.iter().filter(|&&tile| holds(part, tile));
+                judged.for_each(|&tile| error.renew(tile, &newer, part));
+            }
+            error => *error = Some(newer),
         }
     }
 

@@ -115,6 +115,11 @@ impl TileGrid {
         self.height
     }
 
+    /// Image width and height in pixels.
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
     /// Tile edge in pixels.
     pub fn edge(&self) -> usize {
         self.edge

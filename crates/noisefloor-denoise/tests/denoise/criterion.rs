@@ -1,12 +1,16 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
 use noisefloor::{
-    Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, ToneMapping,
-    criterion::CriterionError, source::FirstHits,
+    Audience, Film, Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, Tile, TileGrid,
+    ToneMapping, Viewing,
+    criterion::{CriterionError, View},
+    display::Display,
+    source::FirstHits,
 };
 use noisefloor_denoise::{
     AuxiliaryPictures, DenoiseError, DenoisedError, DenoisedQuality, Denoiser, ESTIMATE_ERRS_BY,
     NoisyPicture, spp_with_denoising, spp_without_denoising,
 };
+use noisefloor_testkit::Noise;
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use std::sync::{Arc, Mutex};
 
@@ -240,4 +244,80 @@ fn halves_have_guides_of_their_own() {
     run(&mut Session::new(SIZE.0, SIZE.1, guided, params).unwrap()).unwrap();
     let seen = seen.lock().unwrap();
     assert!(!seen.is_empty() && seen.chunks(2).all(|two| two == [Some(0.25), Some(0.75)]), "{seen:?}");
+}
+
+/// Notes the parts that it is asked for, and sees all of the picture.
+struct Parted(Simple, Arc<Mutex<Vec<Vec<Tile>>>>);
+
+impl Denoiser for Parted {
+    fn name(&self) -> String {
+        self.0.name()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        self.0.denoise(picture)
+    }
+
+    fn denoise_parts(
+        &mut self,
+        pictures: [&NoisyPicture<'_>; 2],
+        parts: &[Tile],
+    ) -> Result<Vec<[Vec<Rgb>; 2]>, DenoiseError> {
+        self.1.lock().unwrap().push(parts.to_vec());
+        self.0.denoise_parts(pictures, parts)
+    }
+}
+
+/// Verdicts look at what lies around open tiles, and say of them what a look at the whole says; reports are of the whole, though
+/// a render that was resumed may only have looked at parts.
+#[test]
+fn few_open_tiles_are_judged_by_what_is_near() {
+    const SIZE: (usize, usize) = (448, 320);
+    let mut film = Film::new(TileGrid::new(SIZE.0, SIZE.1, 32).unwrap());
+    let tiles: Vec<Tile> = film.grid().tiles().collect();
+    for &tile in &tiles {
+        for batch in 0..2 {
+            let mut noise = Noise::new(2 * tile.index as u64 + batch);
+            let striped = tile.rows(SIZE.0).flatten().map(|i| 0.3 + 0.1 * (i % SIZE.0 / 8 % 2) as f32);
+            let deviation = 0.02 * (1 + tile.index % 5) as f32;
+            let means: Vec<Rgb> = striped.map(|grey| [grey + deviation * noise.normal() as f32; 3]).collect();
+            film.add(tile.index, 8, &means).unwrap();
+        }
+    }
+    let view = View {
+        film: &film,
+        display: &Display::SRGB,
+        viewing: Viewing::default(),
+        audience: Audience::TRAINED,
+        reference: None,
+    };
+    let judged = |tiles: &[Tile]| {
+        let asked: Arc<Mutex<Vec<Vec<Tile>>>> = Arc::default();
+        let mut criterion = DenoisedQuality::new(Parted(Simple::Bilateral(0.1), Arc::clone(&asked)), 0.1);
+        criterion.judge(&view, tiles).unwrap();
+        let record = criterion.record();
+        let record = record.lock().unwrap().clone();
+        let pixels = |parts: &Vec<Tile>| parts.iter().map(|part| part.pixels()).sum();
+        let asked: Vec<usize> = asked.lock().unwrap().iter().map(pixels).collect();
+        (asked, record)
+    };
+    let all = SIZE.0 * SIZE.1;
+    let (asked, whole) = judged(&tiles);
+    assert_eq!(asked, [all]);
+    // In the corner, in the middle, and two that are far apart
+    for (open, pixels) in [(vec![0], 96 * 96), (vec![79], 160 * 160), (vec![0, 139], 2 * 96 * 96)] {
+        let open: Vec<Tile> = open.into_iter().map(|index| tiles[index]).collect();
+        let (asked, record) = judged(&open);
+        assert_eq!(asked, [pixels, all]);
+        for tile in &open {
+            let ratio = record.jods_lost[tile.index] / whole.jods_lost[tile.index];
+            assert!((ratio - 1.0).abs() < 0.05, "tile {}: x{ratio}", tile.index);
+        }
+        let [error, of_whole] = [&record, &whole].map(|record| record.error.as_ref().unwrap());
+        assert_eq!(error.size(), SIZE);
+        let most = of_whole.residual().iter().fold(0.0_f32, |most, r| most.max(r.abs()));
+        for (i, (a, b)) in error.residual().iter().zip(of_whole.residual()).enumerate() {
+            assert!((a - b).abs() < 0.02 * most, "pixel {i}: {a} and {b} of at most {most}");
+        }
+    }
 }

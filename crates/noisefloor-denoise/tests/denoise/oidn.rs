@@ -1,8 +1,8 @@
 use crate::kit::{SIZE, noisy, truth};
-use noisefloor::Rgb;
+use noisefloor::{Rgb, Tile};
 use noisefloor_denoise::{DenoiseError, Denoiser, NoisyPicture, OIDN, Oidn};
 use noisefloor_sidecar::{FilterPlan, find};
-use noisefloor_testkit::{Requirement, require};
+use noisefloor_testkit::{Noise, Requirement, require};
 use std::num::NonZeroUsize;
 
 fn started() -> Option<Oidn> {
@@ -32,4 +32,39 @@ fn it_denoises_and_repeats_itself() {
     assert!(error(&oidn.denoise(&helped).unwrap()) < 0.8 * error(&once));
     let odd = NoisyPicture { size: (SIZE.0, 3), ..NoisyPicture::new(SIZE, &noisy) };
     assert!(matches!(oidn.denoise(&odd), Err(DenoiseError::Pixels { .. })));
+}
+
+/// A dark wall with stripes, beside a bright one, with noise in proportion.
+fn dark_and_bright(seed: u64) -> Vec<Rgb> {
+    let mut noise = Noise::new(seed);
+    let pixel = |i: usize| {
+        let (x, y) = (i % LARGE.0, i / LARGE.0);
+        let wall = if x < 200 { 0.05 } else { 20.0 };
+        let stripes = 1.0 + 0.3 * (((x + y) / 6 % 2) as f32);
+        let shown = wall * stripes * (1.0 + 0.3 * noise.normal() as f32);
+        [shown.max(0.0); 3]
+    };
+    (0..LARGE.0 * LARGE.1).map(pixel).collect()
+}
+const LARGE: (usize, usize) = (480, 400);
+
+/// Parts differ from the whole by far less than the noise that is left in it, though they are darker or brighter than that.
+#[test]
+fn parts_come_out_as_in_the_whole() {
+    let Some(mut oidn) = started() else { return };
+    let halves = [1, 2].map(dark_and_bright);
+    let pictures = halves.each_ref().map(|half| NoisyPicture::new(LARGE, half));
+    let whole = oidn.denoise_both(pictures.each_ref()).unwrap();
+    let place = |(x, y)| Tile { index: 0, x, y, width: 40, height: 32 };
+    // On the dark wall, off the network's grid; in the corner of the bright one
+    let parts = [(24, 165), (440, 368)].map(place);
+    let made = oidn.denoise_parts(pictures.each_ref(), &parts).unwrap();
+    for (part, [a, b]) in parts.iter().zip(&made) {
+        let inside: Vec<usize> = part.rows(LARGE.0).flatten().collect();
+        let [wa, wb] = whole.each_ref().map(|made| inside.iter().map(|&i| made[i]).collect::<Vec<Rgb>>());
+        let apart = |a: &[Rgb], b: &[Rgb]| a.iter().zip(b).map(|(a, b)| (a[1] - b[1]).powi(2)).sum::<f32>().sqrt();
+        let noise = apart(&wa, &wb);
+        assert!(noise > 0.0 && apart(a, &wa) < 0.1 * noise, "{part:?}: {} of {noise}", apart(a, &wa));
+        assert!(apart(b, &wb) < 0.1 * noise, "{part:?}: {} of {noise}", apart(b, &wb));
+    }
 }
