@@ -132,7 +132,7 @@ pub(crate) unsafe fn write_text(
 /// Checks that there is memory for so many bytes a pixel of the picture, which a call is going to take: where
 /// an allocation fails in the middle of one, the process ends.
 pub(crate) fn memory(grid: TileGrid, bytes_a_pixel: usize) -> Result<(), Failure> {
-    let (width, height) = (grid.width(), grid.height());
+    let (width, height) = grid.size();
     let bytes = width * height * bytes_a_pixel;
     Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
         let what =

@@ -322,7 +322,7 @@ pub fn spp_with_denoising(
     limit: f64,
 ) -> Result<Option<f64>, DenoiseError> {
     let (grid, model) = (film.grid(), VisionModel::new(&viewing));
-    let size = (grid.width(), grid.height());
+    let size = grid.size();
     let [a, b] = film_halves(film);
     let [da, db] = denoiser.denoise_both([&a, &b].map(|half| NoisyPicture::new(size, half)).each_ref())?;
     let error = DenoisedError::new(&DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] }, display)?;

@@ -86,7 +86,10 @@ impl Denoiser for Oidn {
         let wider: Vec<Tile> = parts.iter().map(|&part| aligned(grown(part, CONTEXT, size))).collect();
         if nearly_all(&wider, size) {
             let made = self.denoise_both(pictures)?;
-            return Ok(parts.iter().map(|&part| made.each_ref().map(|made| cut(made, size.0, part))).collect());
+            return Ok(parts
+                .iter()
+                .map(|&part| made.each_ref().map(|made| cut(made, size.0, part)))
+                .collect());
         }
         let both = |(&part, wide): (&Tile, Tile)| {
             let made = self.both(pictures, gains, wide)?;
@@ -170,7 +173,13 @@ fn gain(picture: &NoisyPicture<'_>) -> f32 {
 /// The same and a little more, to the left and above, so that it begins at a multiple of [`ALIGNMENT`].
 fn aligned(part: Tile) -> Tile {
     let (left, above) = (part.x % ALIGNMENT, part.y % ALIGNMENT);
-    Tile { x: part.x - left, y: part.y - above, width: part.width + left, height: part.height + above, ..part }
+    Tile {
+        x: part.x - left,
+        y: part.y - above,
+        width: part.width + left,
+        height: part.height + above,
+        ..part
+    }
 }
 
 #[cfg(test)]

@@ -65,7 +65,7 @@ fn dilate(converged: &mut [bool], grid: TileGrid, tiles: &[Tile]) {
     let mut named = vec![false; grid.len()];
     tiles.iter().for_each(|t| named[t.index] = true);
     let before = converged.to_vec();
-    let (width, height) = (grid.width(), grid.height());
+    let (width, height) = grid.size();
     let active = |x: usize, y: usize| !before[y * width + x] && named[grid.index_at(x, y)];
     for tile in tiles {
         for y in tile.y..tile.y + tile.height {

@@ -214,7 +214,7 @@ impl TilePlanes {
             }
         };
         let residual = |[_, a, b]: [f32; 3], scale| (a - b) * scale;
-        Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
+        Self::gather_linear(grid.size(), tile, display, read, residual)
     }
 
     /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if
@@ -255,7 +255,7 @@ impl TilePlanes {
             }
         };
         let residual = |[shown]: [f32; 1], reference| shown - reference;
-        Self::gather_linear((grid.width(), grid.height()), tile, display, read, residual)
+        Self::gather_linear(grid.size(), tile, display, read, residual)
     }
 }
 

@@ -365,7 +365,7 @@ impl Film {
             let pixel = exposure::of_halves([a, b].map(|(mean, spp)| (mean, spp as f64)))?;
             Some(NoisyPixel { deviation: pixel.deviation.filter(|_| halves), ..pixel })
         };
-        tone.settle_by(|| exposure::estimate((grid.width(), grid.height()), pixel))
+        tone.settle_by(|| exposure::estimate(grid.size(), pixel))
     }
 
     /// The picture so far: mean linear radiance, row-major.

@@ -223,7 +223,7 @@ impl<C: StoppingCriterion> Session<C> {
     pub fn set_reference(&mut self, reference: Reference) -> Result<(), SessionError> {
         let grid = self.film.grid();
         let expected = grid.width() * grid.height();
-        let fits = (reference.width, reference.height) == (grid.width(), grid.height());
+        let fits = (reference.width, reference.height) == grid.size();
         if !fits || reference.pixels.len() != expected {
             return Err(SessionError::Reference { got: reference.pixels.len(), expected });
         }

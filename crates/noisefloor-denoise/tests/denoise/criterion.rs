@@ -1,7 +1,7 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
 use noisefloor::{
-    Audience, Film, Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, Tile, TileGrid,
-    ToneMapping, Viewing,
+    Audience, Film, Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, Tile,
+    TileGrid, ToneMapping, Viewing,
     criterion::{CriterionError, View},
     display::Display,
     source::FirstHits,

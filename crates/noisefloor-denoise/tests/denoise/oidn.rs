@@ -62,7 +62,8 @@ fn parts_come_out_as_in_the_whole() {
     for (part, [a, b]) in parts.iter().zip(&made) {
         let inside: Vec<usize> = part.rows(LARGE.0).flatten().collect();
         let [wa, wb] = whole.each_ref().map(|made| inside.iter().map(|&i| made[i]).collect::<Vec<Rgb>>());
-        let apart = |a: &[Rgb], b: &[Rgb]| a.iter().zip(b).map(|(a, b)| (a[1] - b[1]).powi(2)).sum::<f32>().sqrt();
+        let apart =
+            |a: &[Rgb], b: &[Rgb]| a.iter().zip(b).map(|(a, b)| (a[1] - b[1]).powi(2)).sum::<f32>().sqrt();
         let noise = apart(&wa, &wb);
         assert!(noise > 0.0 && apart(a, &wa) < 0.1 * noise, "{part:?}: {} of {noise}", apart(a, &wa));
         assert!(apart(b, &wb) < 0.1 * noise, "{part:?}: {} of {noise}", apart(b, &wb));

@@ -29,7 +29,7 @@ impl AfterDenoising {
     ) -> Result<Self, LabError> {
         let grid = yardstick.grid();
         let began = Instant::now();
-        let made = denoiser.denoise(&NoisyPicture::new((grid.width(), grid.height()), image))?;
+        let made = denoiser.denoise(&NoisyPicture::new(grid.size(), image))?;
         let seconds = began.elapsed().as_secs_f64();
         let (jod, tiles) = yardstick.jods(&yardstick.encode(&made))?;
         Ok(Self { seconds, jod, jod_worst: tiles.into_iter().fold(10.0, f64::min) })

@@ -188,7 +188,7 @@ impl Comparison {
         }
         Ok(Self {
             source: source.clone(),
-            size: (grid.width(), grid.height()),
+            size: grid.size(),
             reference,
             cancelled: race.cancelled,
             warnings: race.entrants.iter().map(Entrant::warnings).max_by_key(Vec::len).unwrap_or_default(),

@@ -255,7 +255,7 @@ impl Field {
         let grid = self.film.grid();
         let asking = self.entrants.iter_mut().filter(|e| e.session.criterion().needs().reference);
         for entrant in asking {
-            let (width, height) = (grid.width(), grid.height());
+            let (width, height) = grid.size();
             entrant.session.set_reference(Reference { width, height, pixels: truth.to_vec() })?;
         }
         Ok(())

@@ -43,7 +43,7 @@ pub fn cvvdp_of_tiles(
     tiles: &[Tile],
     model: &VisionModel,
 ) -> Result<Vec<f64>, MetricError> {
-    let (width, height) = (grid.width(), grid.height());
+    let (width, height) = grid.size();
     for pixels in [reference, test] {
         DisplayPixels::new(width, height, pixels)?;
     }

@@ -31,7 +31,7 @@ impl FilmHead {
 impl Film {
     /// Checks that there is memory for a film with so many halves: without it, making one ends the process.
     pub(crate) fn check_memory(grid: TileGrid, halves: usize) -> Result<(), FilmError> {
-        let (width, height) = (grid.width(), grid.height());
+        let (width, height) = grid.size();
         let bytes = halves * PIXEL * width * height;
         let there = Vec::<u8>::new().try_reserve_exact(bytes);
         there.map_err(|_| FilmError::Memory { width, height, bytes })

@@ -127,7 +127,7 @@ impl Output {
     pub(super) fn write_denoised(&mut self, session: &Session) -> anyhow::Result<()> {
         let Some(denoised) = &mut self.denoised else { return Ok(()) };
         let grid = session.film().grid();
-        let (width, height) = (grid.width(), grid.height());
+        let (width, height) = grid.size();
         let began = Instant::now();
         let (noisy, wants) = (session.film().image(), denoised.denoiser.wants());
         let picture = NoisyPicture::new((width, height), &noisy);

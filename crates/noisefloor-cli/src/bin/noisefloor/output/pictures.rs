@@ -13,7 +13,7 @@ impl Output {
         let tiles = states(session);
         let film = session.film();
         let grid = film.grid();
-        let (width, height) = (grid.width(), grid.height());
+        let (width, height) = grid.size();
 
         // image.exr: what each pixel's tile knows, as channels. A picture can be large: nothing is copied.
         let tile = |pixel: usize| grid.index_at(pixel % width, pixel / width);
