@@ -25,6 +25,7 @@ pub use reference::ReferenceArgs;
 pub use render::RenderArgs;
 pub use scenes::{CheckArgs, ScenesCommand};
 pub use tune::TuneArgs;
+pub use verdicts::FIRST_DENOISED;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;

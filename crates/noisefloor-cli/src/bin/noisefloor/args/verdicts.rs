@@ -35,8 +35,8 @@ pub struct VerdictArgs {
     /// factor on samples, or a,b for T' = a T + b [default: see --eyes].
     #[arg(long, value_name = "WHO", value_parser = values::audience)]
     pub audience: Option<Audience>,
-    /// No tile stops before this many samples per pixel [default: 16, or one batch with --batch or
-    /// --denoise]. Below 100, only tiles stop whose noise is spread over many pixels. More find more of the
+    /// No tile stops before this many samples per pixel [default: 16, or one batch with --batch; with
+    /// --denoise 48 of the built-in renderer]. Below 100, only tiles stop whose noise is spread over many pixels. More find more of the
     /// light that is seldom found.
     #[arg(long, value_name = "SPP")]
     pub min_spp: Option<u64>,
@@ -52,8 +52,8 @@ pub struct VerdictArgs {
     )]
     pub schedule: ScheduleChoice,
     /// Samples per pixel between two verdicts on a tile, at the least [default: 8, more for renderers with
-    /// patterns, or 100 with --schedule every; with --denoise 48, or 16 of other renderers, and then half as many more each time, or more
-    /// where few tiles are open].
+    /// patterns, or 100 with --schedule every; with --denoise 16, and half as many as a tile has, or more where
+    /// few are open].
     #[arg(long, value_name = "SPP")]
     pub batch: Option<u64>,
     /// Stop a tile only after K verdicts of "converged" in a row, each a quarter more samples after the
@@ -85,6 +85,9 @@ const TILE: usize = 64;
 /// Denoised pictures are judged by squares of 64 pixels. Many tiles cost other renderers much.
 const DENOISED_TILE: usize = 32;
 
+/// The first verdict on denoised halves of the built-in renderer, in samples per pixel: what two denoisings cost is worth
+/// more of its samples than of slower renderers', and earlier stops lose more (docs/benchmarks/tiles.md).
+pub const FIRST_DENOISED: u64 = 48;
 /// A quarter of the samples: twice the noise.
 const DRAFT: Audience = Audience { slope: 0.25, offset: 0.0 };
 const DEFAULT_LOST: f64 = noisefloor_denoise::DEFAULT_JODS_LOST;
@@ -125,8 +128,6 @@ impl VerdictArgs {
         let audience = self.audience.unwrap_or(otherwise);
         let step = |default: u64| self.batch.unwrap_or(default);
         let schedule = match (denoise, self.schedule) {
-            // What two denoisings cost is worth more samples of the built-in renderer than of slower ones
-            (true, _) if renderer.is_built_in() => Schedule::Growing { step: step(48) },
             (true, _) => Schedule::Growing { step: step(16) },
             (false, ScheduleChoice::Spaced) => Schedule::Spaced { step: step(renderer.step()) },
             (false, ScheduleChoice::Every) => Schedule::Every { step: step(100) },
@@ -134,6 +135,7 @@ impl VerdictArgs {
         let draft = preset == Some(Preset::Draft);
         // With steps that were asked for, or that a denoiser has, the first one is a verdict
         let first = match self.batch {
+            None if denoise && renderer.is_built_in() => FIRST_DENOISED,
             _ if denoise => 0,
             Some(_) => 0,
             None => Params::default().min_spp,

@@ -1,5 +1,6 @@
 //! `render --denoise`: a criterion and the denoiser that it shares with the output.
 
+use crate::args::FIRST_DENOISED;
 use crate::output::Denoised;
 use noisefloor::{ProgressiveSource, Session, SourceError, StoppingCriterion, source::FirstHits};
 use noisefloor_cli::say::say;
@@ -14,8 +15,6 @@ use std::time::Duration;
 
 /// Renders below this say nothing of what denoising would have saved.
 const LONG: Duration = Duration::from_secs(30);
-/// The first verdict on denoised halves, in samples per pixel.
-const FIRST_DENOISED: u64 = 48;
 /// What is saved must be more than the estimate may be wrong by.
 const WORTH_SAYING: f64 = 2.0;
 
