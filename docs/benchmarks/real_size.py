@@ -5,12 +5,13 @@
     real_size.py measure OUT > rows.csv  JOD lost by the worst square of 64 pixels, by `noisefloor metrics`
     real_size.py package OUT SCENE       the same of one scene by the PyPI package cvvdp, no code of this project
     real_size.py table rows.csv          the tables of real-size.md
-    real_size.py plot rows.csv OUT.svg   error against samples, of the denoised pictures; needs matplotlib
+    real_size.py plot rows.csv OUT.svg   error against run time, of the denoised pictures; needs matplotlib
 
 Each scene is rendered by the built-in path tracer: until the oracle stops all tiles, noisy and denoised; with one number of
 samples for all pixels, which are denoised, too; and once with far more samples and another seed, as the reference. Its own
 noise is not little where rooms are lit by windows, so everything is measured a second time against the denoised reference,
 which has nearly none, but may have lost a little texture.
+Rivals render noisy pictures, which are denoised when they are measured, if the package mitsuba-oidn is there.
 Seconds are of the processor, the denoiser's process included. Needs numpy, OpenEXR and pillow."""
 import argparse
 import csv
@@ -31,6 +32,8 @@ import at_the_stop as shown  # noqa: E402
 
 # Numbers of samples for all pixels; of a scene, up to half of its reference's
 UNIFORM = tuple(32 << power for power in range(8))
+# With the constants that agree with people (criteria.md)
+RIVALS = {"cycles": "cycles:0.081", "dammertz": "dammertz:0.0046"}
 EDGE = 64
 
 
@@ -48,8 +51,9 @@ def jobs(args):
         **{f"uniform-{spp}": uniform(spp) for spp in UNIFORM if 2 * spp <= args.reference},
         "reference": [*uniform(many), "--seed", "77"],
     }
-    more = {"oracle-denoised-2": [*oidn, "--seed", "2"], "oracle": ["--max-spp", str(args.reference // 2)]}
-    return needed, more
+    most = ["--max-spp", str(args.reference // 2)]
+    more = {"oracle-denoised-2": [*oidn, "--seed", "2"], "oracle": most}
+    return needed, more | {name: ["--criterion", criterion, "--tile", "32", *most] for name, criterion in RIVALS.items()}
 
 
 def render(args):
@@ -60,7 +64,7 @@ def render(args):
             if done.exists():
                 continue
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            command = [args.noisefloor, "render", scene, "--size", args.size, "--seed", "1", "--out", str(out)]
+            command = [args.noisefloor, "render", scene, "--source", args.source, "--size", args.size, "--seed", "1", "--out", str(out)]
             if "--seed" in options:
                 del command[command.index("--seed"):command.index("--seed") + 2]
             if (out / "checkpoint.nfc").exists():
@@ -97,10 +101,28 @@ def pictures(folder):
         meant = job.name.startswith("oracle-denoised")
         if not meant:
             yield job.name, shown.shown(shown.load(job)[0], gain), spp.mean(), cost
-        denoised = job / "image-denoised.exr"
-        if denoised.exists():
+        if job.name in RIVALS:
+            yield f"{job.name}-denoised", shown.shown(denoised(job, folder / "oracle-denoised"), gain), spp.mean(), cost
+        if (job / "image-denoised.exr").exists():
             label = job.name if meant else f"{job.name}-denoised"
-            yield label, shown.shown(shown.load(f"{denoised}:0")[0], gain), spp.mean(), cost
+            yield label, shown.shown(shown.load(f"{job}/image-denoised.exr:0")[0], gain), spp.mean(), cost
+
+
+def denoised(job, guides):
+    """What Open Image Denoise makes of a picture that was rendered without it, with the albedo and normals of another render."""
+    import mitsuba_oidn as oidn
+
+    channels = {"color": job / "image.exr", "albedo": guides / "albedo.exr", "normal": guides / "normal.exr"}
+    planes = {name: np.ascontiguousarray(shown.load(f"{path}:0")[0], dtype=np.float32) for name, path in channels.items()}
+    device = oidn.Device(oidn.DeviceType.CPU)
+    device.commit()
+    task = device.new_filter("RT")
+    task.hdr, task.quality = True, oidn.Quality.High
+    planes["output"] = np.empty_like(planes["color"])
+    for name, plane in planes.items():
+        task.set_image(name, plane)
+    task.execute()
+    return planes["output"]
 
 
 def measure(args, lost=None):
@@ -131,7 +153,7 @@ def package(args):
 
 
 def as_good(uniform, lost):
-    """Samples at which uniform sampling has lost as much: straight between two counts in logarithms. None outside."""
+    """Samples, or seconds, at which uniform sampling has lost as much: straight between two of them in logarithms. None outside."""
     for (low, before), (high, after) in zip(uniform, uniform[1:]):
         if before >= lost >= after:
             share = math.log(before / lost) / math.log(before / after)
@@ -149,23 +171,26 @@ def table(args):
     for (kind, oracle), reference in itertools.product(runs.items(), ("_denoised", "")):
         suffix = "" if kind == "noisy" else "-denoised"
         print(f"\n| {kind}, {'denoised reference' if reference else 'reference'} | spp | seconds | worst, most of 20, median | "
-              + " | ".join(f"uniform {n}" for n in UNIFORM) + " | as good by the worst | by most of 20 |")
-        print("|---" * (6 + len(UNIFORM)) + "|")
-        ratios = {"worst": [], "most": []}
+              + " | ".join(f"uniform {n}" for n in UNIFORM) + " | as good by the worst | by most of 20 | seconds by the worst |")
+        print("|---" * (7 + len(UNIFORM)) + "|")
+        ratios = {"worst": [], "most": [], "seconds": []}
         for scene, found in scenes.items():
             ours = [found[name] for name in oracle if name in found]
             if not ours:
                 continue
             mean = lambda key: np.mean([one[key] for one in ours])
             uniform = [(n, found[f"uniform-{n}{suffix}"]) for n in UNIFORM if f"uniform-{n}{suffix}" in found]
-            cells = [f"{row['worst' + reference]:.2f}, {row['most' + reference]:.2f}" for _, row in uniform]
-            for by, all_ratios in ratios.items():
-                series = [(n, row[by + reference]) for n, row in uniform]
-                lost = mean(by + reference)
-                spp = as_good(series, lost)
-                cells.append(f"{spp:.0f}, ×{spp / mean('spp'):.2f}" if spp else
-                             f"> {series[-1][0]}" if series[-1][1] > lost else f"< {series[0][0]}")
-                all_ratios += [spp / mean("spp")] if spp else []
+            shown_at = dict(uniform)
+            cells = [f"{shown_at[n]['worst' + reference]:.2f}, {shown_at[n]['most' + reference]:.2f}" if n in shown_at else ""
+                     for n in UNIFORM]
+            for by, unit in (("worst", "spp"), ("most", "spp"), ("worst", "seconds")):
+                # Of a run that was interrupted, the seconds are not known
+                series = [(row[unit], row[by + reference]) for _, row in uniform if row[unit] > 0]
+                lost, took = mean(by + reference), np.nanmean([one[unit] for one in ours])
+                same = as_good(series, lost)
+                cells.append(f"{same:.0f}, ×{same / took:.2f}" if same else
+                             f"> {series[-1][0]:.0f}" if series[-1][1] > lost else f"< {series[0][0]:.0f}")
+                ratios[by if unit == "spp" else unit] += [same / took] if same else []
             lost = " / ".join(", ".join(f"{one[key + reference]:.2f}" for key in ("worst", "most", "median")) for one in ours)
             spps = " / ".join(f"{one['spp']:.0f}" for one in ours)
             print(f"| {scene} | {spps} | {np.nanmean([one['seconds'] for one in ours]):.0f} | {lost} | " + " | ".join(cells) + " |")
@@ -190,20 +215,24 @@ def plot(args):
         if scene is None:
             panel.axis("off")
             continue
+        # Of a run that was interrupted, the seconds are not known
+        rows = [row for row in rows if float(row["seconds"]) > 0]
         uniform = [row for row in rows if row["picture"].startswith("uniform-") and row["picture"].endswith("-denoised")]
         uniform.sort(key=lambda row: float(row["spp"]))
         ours = [row for row in rows if row["picture"] in ("oracle-denoised", "oracle-denoised-2")]
+        rivals = [row for row in rows if row["picture"].removesuffix("-denoised") in RIVALS and row["picture"].endswith("-denoised")]
         for key, colour in (("worst_denoised", "#c0392b"), ("median_denoised", "#2c7fb8")):
-            at = lambda rows: ([float(row["spp"]) for row in rows], [float(row[key]) for row in rows])
+            at = lambda rows: ([float(row["seconds"]) for row in rows], [float(row[key]) for row in rows])
             panel.plot(*at(uniform), "-", color=colour, marker=".", linewidth=1)
+            panel.plot(*at(rivals), "x", color=colour, markersize=6)
             panel.plot(*at(ours), "o", color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6)
         panel.axhline(0.3, color="grey", linewidth=0.7, linestyle=":")
-        panel.set(xscale="log", yscale="log", title=scene, ylim=(0.04, 2.5))
-        panel.set_yticks([0.1, 0.3, 1.0], ["0.1", "0.3", "1"])
+        panel.set(xscale="log", yscale="log", title=scene, ylim=(0.02, 2.5))
+        panel.set_yticks([0.03, 0.1, 0.3, 1.0], ["0.03", "0.1", "0.3", "1"])
         panel.minorticks_off()
-        ticks = [t for t in (30, 100, 300, 1000) if panel.get_xlim()[0] <= t <= panel.get_xlim()[1]]
+        ticks = [t for t in (10, 30, 100, 300, 1000) if panel.get_xlim()[0] <= t <= panel.get_xlim()[1]]
         panel.set_xticks(ticks, [str(t) for t in ticks])
-    figure.supxlabel("samples per pixel, on average")
+    figure.supxlabel("processor seconds")
     figure.supylabel("JOD lost")
     figure.tight_layout()
     figure.savefig(args.out, metadata={"Date": None})
@@ -220,6 +249,7 @@ def main():
             sub.add_argument(word, nargs="+" if word == "scenes" else None)
         if command is render:
             sub.add_argument("--size", default="480x270")
+            sub.add_argument("--source", default="ptwne", help="the renderer, as of `noisefloor render`")
             sub.add_argument("--reference", type=int, default=4096)
     args = parser.parse_args()
     args.run(args)
