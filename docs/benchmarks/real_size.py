@@ -10,7 +10,8 @@
 Each scene is rendered by the built-in path tracer: until the oracle stops all tiles, noisy and denoised; with one number of
 samples for all pixels, which are denoised, too; and once with far more samples and another seed, as the reference. Its own
 noise is not little where rooms are lit by windows, so everything is measured a second time against the denoised reference,
-which has nearly none, but may have lost a little texture.
+which has nearly none, but may have lost a little texture. Where the oracle gives tiles more samples than the reference has, another
+render of the oracle, with a third seed, is the reference.
 Rivals render noisy pictures, which are denoised when they are measured, if the package mitsuba-oidn is there.
 Seconds are of the processor, the denoiser's process included. Needs numpy, OpenEXR and pillow."""
 import argparse
@@ -32,6 +33,8 @@ import at_the_stop as shown  # noqa: E402
 
 # Numbers of samples for all pixels; of a scene, up to half of its reference's
 UNIFORM = tuple(32 << power for power in range(8))
+# Those that tables show
+SHOWN = (64, 256, 512)
 # With the constants that agree with people (criteria.md)
 RIVALS = {"cycles": "cycles:0.081", "dammertz": "dammertz:0.0046"}
 EDGE = 64
@@ -52,7 +55,7 @@ def jobs(args):
         "reference": [*uniform(many), "--seed", "77"],
     }
     most = ["--max-spp", str(args.reference // 2)]
-    more = {"oracle-denoised-2": [*oidn, "--seed", "2"], "oracle": most}
+    more = {"reference-adaptive": [*oidn, "--seed", "78"], "oracle-denoised-2": [*oidn, "--seed", "2"], "oracle": most}
     return needed, more | {name: ["--criterion", criterion, "--tile", "32", *most] for name, criterion in RIVALS.items()}
 
 
@@ -87,12 +90,18 @@ def squares(height, width):
 
 def pictures(folder):
     """Both references as shown, and every other picture of a scene under their exposure, with its samples."""
-    truth, _ = shown.load(folder / "reference")
-    gain = shown.exposure(truth)
-    yield shown.shown(truth, gain), shown.shown(shown.load(f"{folder}/reference/image-denoised.exr:0")[0], gain)
+    (noisy, many), clean = shown.load(folder / "reference"), shown.load(f"{folder}/reference/image-denoised.exr:0")[0]
+    adaptive = folder / "reference-adaptive"
+    if (adaptive / "processor-seconds.json").exists():
+        better, spp = shown.load(adaptive)
+        where = (spp > many)[..., None]
+        noisy = np.where(where, better, noisy)
+        clean = np.where(where, shown.load(f"{adaptive}/image-denoised.exr:0")[0], clean)
+    gain = shown.exposure(noisy)
+    yield shown.shown(noisy, gain), shown.shown(clean, gain)
     for job in sorted(folder.iterdir()):
         seconds = job / "processor-seconds.json"
-        if job.name == "reference" or not seconds.exists():
+        if job.name.startswith("reference") or not seconds.exists():
             continue
         _, spp = shown.load(job)
         kept = json.loads(seconds.read_text())
@@ -167,12 +176,12 @@ def table(args):
         numbers = {key: float(value) for key, value in row.items() if key not in ("scene", "picture")}
         scenes.setdefault(row["scene"], {})[row["picture"]] = numbers
     runs = {"denoised": ["oracle-denoised", "oracle-denoised-2"], "without the margin": ["oracle-denoised-without-margin"],
-            "noisy": ["oracle"]}
+            "noisy": ["oracle"], **{f"{name}, denoised": [f"{name}-denoised"] for name in RIVALS}}
     for (kind, oracle), reference in itertools.product(runs.items(), ("_denoised", "")):
         suffix = "" if kind == "noisy" else "-denoised"
-        print(f"\n| {kind}, {'denoised reference' if reference else 'reference'} | spp | seconds | worst, most of 20, median | "
-              + " | ".join(f"uniform {n}" for n in UNIFORM) + " | as good by the worst | by most of 20 | seconds by the worst |")
-        print("|---" * (7 + len(UNIFORM)) + "|")
+        print(f"\n| {kind}, {'denoised reference' if reference else 'reference'} | samples | seconds | worst, most of 20, median | "
+              + " | ".join(f"uniform {n}" for n in SHOWN) + " | as good by the worst | by most of 20 | in seconds |")
+        print("|---" * (7 + len(SHOWN)) + "|")
         ratios = {"worst": [], "most": [], "seconds": []}
         for scene, found in scenes.items():
             ours = [found[name] for name in oracle if name in found]
@@ -182,7 +191,7 @@ def table(args):
             uniform = [(n, found[f"uniform-{n}{suffix}"]) for n in UNIFORM if f"uniform-{n}{suffix}" in found]
             shown_at = dict(uniform)
             cells = [f"{shown_at[n]['worst' + reference]:.2f}, {shown_at[n]['most' + reference]:.2f}" if n in shown_at else ""
-                     for n in UNIFORM]
+                     for n in SHOWN]
             for by, unit in (("worst", "spp"), ("most", "spp"), ("worst", "seconds")):
                 # Of a run that was interrupted, the seconds are not known
                 series = [(row[unit], row[by + reference]) for _, row in uniform if row[unit] > 0]
