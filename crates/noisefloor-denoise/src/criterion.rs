@@ -90,17 +90,19 @@ impl<D: Denoiser> DenoisedQuality<D> {
             let guided = pictures.iter_mut().zip(guides.iter());
             guided.for_each(|(picture, guide)| *picture = picture.guided(guide, wants));
         }
-        let made = self.denoiser.denoise_parts(pictures.each_ref(), parts);
-        let errors = made.and_then(|made| {
-            let errors = parts.iter().zip(&made).map(|(&part, [da, db])| {
-                let [a, b] = halves.each_ref().map(|half| cut(half, size.0, part));
-                let size = (part.width, part.height);
-                let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [da, db] };
-                Ok((part, DenoisedError::new(&halves, view.display)?))
-            });
-            errors.collect()
+        let made =
+            self.denoiser.denoise_parts(pictures.each_ref(), parts).map_err(|error| self.failed(&error))?;
+        if made.len() != parts.len() {
+            let why = format!("it was asked for {} parts, and returned {}", parts.len(), made.len());
+            return Err(CriterionError::Failed { name: self.name(), why });
+        }
+        let errors = parts.iter().zip(&made).map(|(&part, [da, db])| {
+            let [a, b] = halves.each_ref().map(|half| cut(half, size.0, part));
+            let size = (part.width, part.height);
+            let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [da, db] };
+            Ok((part, DenoisedError::new(&halves, view.display).map_err(|error| self.failed(&error))?))
         });
-        errors.map_err(|error| self.failed(&error))
+        errors.collect()
     }
 
     fn failed(&self, error: &DenoiseError) -> CriterionError {

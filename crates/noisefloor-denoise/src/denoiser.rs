@@ -123,9 +123,12 @@ pub trait Denoiser {
         pictures: [&NoisyPicture<'_>; 2],
         parts: &[Tile],
     ) -> Result<Vec<[Vec<Rgb>; 2]>, DenoiseError> {
-        let width = pictures[0].size.0;
+        let size = pictures[0].size;
         let made = self.denoise_both(pictures)?;
-        Ok(parts.iter().map(|&part| made.each_ref().map(|made| cut(made, width, part))).collect())
+        if let Some(odd) = made.iter().find(|made| size.0.checked_mul(size.1) != Some(made.len())) {
+            return Err(DenoiseError::Pixels { size, got: odd.len() });
+        }
+        Ok(parts.iter().map(|&part| made.each_ref().map(|made| cut(made, size.0, part))).collect())
     }
 }
 

@@ -208,6 +208,53 @@ fn failures_are_said() {
     assert!(why.contains("out of order"), "{why}");
 }
 
+/// Returns a pixel too few.
+struct Short;
+
+impl Denoiser for Short {
+    fn name(&self) -> String {
+        "short".into()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        Ok(picture.radiance[1..].to_vec())
+    }
+}
+
+/// Returns no parts.
+struct Partless;
+
+impl Denoiser for Partless {
+    fn name(&self) -> String {
+        "partless".into()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        Ok(picture.radiance.to_vec())
+    }
+
+    fn denoise_parts(
+        &mut self,
+        _: [&NoisyPicture<'_>; 2],
+        _: &[Tile],
+    ) -> Result<Vec<[Vec<Rgb>; 2]>, DenoiseError> {
+        Ok(Vec::new())
+    }
+}
+
+/// A denoiser that breaks its promises ends a render with an error that says so, and no panic.
+#[test]
+fn denoisers_that_return_too_little_are_refused() {
+    let why = |outcome: Result<Vec<u64>, SessionError>| match outcome {
+        Err(SessionError::Criterion(CriterionError::Failed { why, .. })) => why,
+        other => panic!("{other:?}"),
+    };
+    let short = why(run(&mut session(Short)));
+    assert!(short.contains("24575 pixels, not 192×128"), "{short}");
+    let partless = why(run(&mut session(Partless)));
+    assert!(partless.contains("asked for 1 parts, and returned 0"), "{partless}");
+}
+
 /// Notes the albedo that it is given, and takes it for the picture.
 struct Guided(Arc<Mutex<Vec<Option<f32>>>>);
 
