@@ -1,15 +1,22 @@
 //! Sessions: pushed samples in, stops out.
 
 use crate::border;
-use crate::denoise::{DenoisedBy, not_while_denoising};
+use crate::denoise::{DenoisedBy, NfDenoise};
 use crate::handle;
 use crate::oracle::NfOracle;
 use crate::params::NfParams;
-use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{Checkpoint, Oracle, Params, Request, Rgb, Session, StoppingCriterion, Tile, TileGrid};
+use crate::status::{Failure, NfStatus, guard, not_while_denoising};
+use crate::tone::curve;
+use noisefloor::source::FirstHits;
+use noisefloor::{
+    Checkpoint, Oracle, Params, Request, Rgb, Schedule, Session, StoppingCriterion, Tile, TileGrid,
+    ToneMapping,
+};
 use noisefloor_denoise::DenoisedRecord;
+use std::ffi::c_void;
+use std::mem::MaybeUninit;
 use std::ops::{Deref, DerefMut};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Film, oracle and limits of one picture.
 pub struct NfSession {
@@ -157,6 +164,62 @@ pub unsafe extern "C" fn nf_session_new(
     })
 }
 
+/// As nf_session_new, for pictures that are denoised before anyone sees them: a tile is done when what denoise makes of
+/// the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, 19 of 20 tiles
+/// by the vision model; nobody has been asked about denoised pictures. See also nf_session_undenoised. Both halves of the samples are denoised apart, so a
+/// verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
+/// NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
+/// NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
+/// independent of each other.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_new_denoised(
+    width: usize,
+    height: usize,
+    denoise: NfDenoise,
+    user: *mut c_void,
+    lost: f64,
+    first_hits: *const *const f32,
+    floats: usize,
+    params: *const NfParams,
+    session: *mut *mut NfSession,
+) -> NfStatus {
+    guard(|| {
+        let denoise = denoise.ok_or_else(|| Failure::new(NfStatus::NullPointer, "denoise is NULL"))?;
+        if !(lost > 0.0 && lost.is_finite()) {
+            let message = format!("lost must be a positive number of JOD, not {lost}");
+            return Err(Failure::new(NfStatus::Argument, message));
+        }
+        let params = if params.is_null() {
+            Params::default().with_schedule(Schedule::Growing { step: 48 }).with_min_spp(48)
+        } else {
+            // SAFETY: not null, and promised by the caller.
+            unsafe { border::object(params, "params")?.to_params() }?
+        };
+        TileGrid::new(width, height, params.tile)?;
+        let first_hits = if first_hits.is_null() {
+            None
+        } else {
+            // SAFETY: promised by the caller.
+            let pictures = unsafe { border::array(first_hits, 4, 4, "first_hits") }?;
+            let pixels = |picture: *const f32| -> Result<Vec<Rgb>, Failure> {
+                // SAFETY: promised by the caller.
+                let values = unsafe { border::array(picture, floats, 3 * width * height, "first_hits") }?;
+                if !values.iter().all(|value| value.is_finite()) {
+                    return Err(Failure::new(NfStatus::Argument, "first_hits: a value is not finite"));
+                }
+                Ok(values.as_chunks().0.to_vec())
+            };
+            let half = |albedo, normal| -> Result<FirstHits, Failure> {
+                Ok(FirstHits { width, height, albedo: pixels(albedo)?, normal: pixels(normal)? })
+            };
+            Some(Arc::new([half(pictures[0], pictures[1])?, half(pictures[2], pictures[3])?]))
+        };
+        let judging = Judging::Denoised(DenoisedBy { denoise, user, lost, first_hits });
+        // SAFETY: promised by the caller.
+        unsafe { handle::give(session, || NfSession::new((width, height), judging, params)) }
+    })
+}
+
 /// Frees a session, once calls on it have returned. NULL is ignored, a second time is NF_STATUS_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn nf_session_free(session: *mut NfSession) -> NfStatus {
@@ -228,5 +291,87 @@ pub unsafe extern "C" fn nf_session_judge(session: *const NfSession, newly_done:
         }
         // SAFETY: not null, and promised by the caller.
         unsafe { border::write(newly_done, stops.len(), "newly_done") }
+    })
+}
+
+/// Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
+/// tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
+/// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
+/// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
+/// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
+/// values are interpolated linearly. Tables are kept until the program ends, each once.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_set_tone_table(
+    session: *const NfSession,
+    exposure: f32,
+    toe: f32,
+    top: f32,
+    table: *const f32,
+    floats: usize,
+    edge: usize,
+) -> NfStatus {
+    guard(|| {
+        let session = handle::get(session)?;
+        // SAFETY: promised by the caller.
+        let curve = unsafe { curve((toe, top), table, floats, edge) }?;
+        let tone = ToneMapping::Custom { exposure, curve };
+        tone.check().map_err(|error| Failure::new(NfStatus::Argument, error.to_string()))?;
+        Ok(session.lock()?.set_display(tone.settle(&[]))?)
+    })
+}
+
+/// Just-objectionable differences that each tile to be shown has lost, by its last verdict: a double for each tile, NaN
+/// before the first. NF_STATUS_UNAVAILABLE if the session has no denoiser.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_jods_lost(
+    session: *const NfSession,
+    lost: *mut f64,
+    capacity: usize,
+) -> NfStatus {
+    // SAFETY: promised by the caller.
+    unsafe {
+        of_tiles(session, (lost, capacity), "lost", |record, tile| {
+            record.jods_lost.get(tile).copied().unwrap_or(f64::NAN)
+        })
+    }
+}
+
+/// Which tiles are to be shown as rendered instead of denoised: their noise has lost no more than is allowed, and what the
+/// denoiser makes of them has. A bool for each tile; false before the first verdict. NF_STATUS_UNAVAILABLE if the session
+/// has no denoiser.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_undenoised(
+    session: *const NfSession,
+    undenoised: *mut bool,
+    capacity: usize,
+) -> NfStatus {
+    // SAFETY: promised by the caller.
+    unsafe {
+        of_tiles(session, (undenoised, capacity), "undenoised", |record, tile| {
+            record.undenoised.get(tile) == Some(&true)
+        })
+    }
+}
+
+/// Writes what is recorded of each tile.
+unsafe fn of_tiles<T>(
+    session: *const NfSession,
+    (values, capacity): (*mut T, usize),
+    name: &str,
+    of: impl Fn(&DenoisedRecord, usize) -> T,
+) -> NfStatus {
+    guard(|| {
+        let session = handle::get(session)?;
+        // SAFETY: promised by the caller, but for the values, which need not be any before.
+        let room = unsafe {
+            border::array_mut::<MaybeUninit<T>>(values.cast(), capacity, session.grid.len(), name)
+        }?;
+        let judged = session.lock()?;
+        let record = judged.record.as_ref();
+        let record =
+            record.ok_or_else(|| Failure::new(NfStatus::Unavailable, "the session has no denoiser"))?;
+        let record = record.lock().unwrap_or_else(PoisonError::into_inner);
+        room.iter_mut().enumerate().for_each(|(tile, place)| _ = place.write(of(&record, tile)));
+        Ok(())
     })
 }

@@ -5,7 +5,7 @@ use noisefloor::{
     oracle::PeopleError, params::ParamsError, tile::TileError, viewing::ViewingTextError,
 };
 use std::any::Any;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -58,6 +58,18 @@ impl Failure {
 
 thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
+    /// Whether this thread is inside a denoiser, whose session waits for it.
+    pub(crate) static DENOISING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Refuses what would wait for itself.
+pub(crate) fn not_while_denoising() -> Result<(), Failure> {
+    match DENOISING.get() {
+        true => {
+            Err(Failure::new(NfStatus::Argument, "a denoiser cannot use sessions: one of them waits for it"))
+        }
+        false => Ok(()),
+    }
 }
 
 /// Runs what a function of the library does. Whatever goes wrong becomes a status and a message.
@@ -66,7 +78,7 @@ thread_local! {
 /// change, and results are written last.
 pub(crate) fn guard(body: impl FnOnce() -> Result<(), Failure>) -> NfStatus {
     #[cfg(target_family = "wasm")]
-    crate::wasm::keep_last_words();
+    keep_last_words();
     let outcome = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         Err(Failure::new(NfStatus::Internal, format!("noisefloor made a mistake: {}", words(&*panic))))
     });
@@ -75,7 +87,18 @@ pub(crate) fn guard(body: impl FnOnce() -> Result<(), Failure>) -> NfStatus {
     failure.status
 }
 
-pub(crate) fn set_last_error(message: &str) {
+/// Lets `nf_last_error` say after a trap what the panic said: on a page, a panic does not unwind.
+#[cfg(target_family = "wasm")]
+fn keep_last_words() {
+    static HOOK: std::sync::Once = std::sync::Once::new();
+    HOOK.call_once(|| {
+        std::panic::set_hook(Box::new(|panic| {
+            set_last_error(&format!("noisefloor made a mistake: {panic}"))
+        }));
+    });
+}
+
+fn set_last_error(message: &str) {
     let message = CString::new(message.replace('\0', "?")).unwrap_or_default();
     LAST_ERROR.with(|last| *last.borrow_mut() = message);
 }

@@ -1,9 +1,6 @@
-//! What a page needs beside the functions of the header: memory for arrays, and the words of a panic, which
-//! ends in a trap here instead of unwinding.
+//! What a page needs beside the functions of the header: memory for arrays.
 
-use crate::status::set_last_error;
 use std::alloc::{Layout, alloc, dealloc};
-use std::sync::Once;
 
 /// As much as any type of the header asks for, and what vector instructions like.
 const ALIGN: usize = 16;
@@ -25,14 +22,4 @@ pub unsafe extern "C" fn nf_dealloc(pointer: *mut u8, bytes: usize) {
         // SAFETY: `nf_alloc` gave it with this layout, as the caller promises.
         unsafe { dealloc(pointer, layout) }
     }
-}
-
-/// Lets `nf_last_error` say after a trap what the panic said.
-pub(crate) fn keep_last_words() {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        std::panic::set_hook(Box::new(|panic| {
-            set_last_error(&format!("noisefloor made a mistake: {panic}"))
-        }));
-    });
 }

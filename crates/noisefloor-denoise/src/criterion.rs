@@ -1,7 +1,7 @@
 //! A limit on what people would see of the error of the denoised picture, as a stopping criterion.
 
 use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture, cut};
-use crate::estimate::{DenoisedError, DenoisedHalves};
+use crate::estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY, PartError};
 use crate::parts::{holds, parts_around, whole, within};
 use crate::record::DenoisedRecord;
 use noisefloor::{
@@ -26,10 +26,6 @@ const DENOISED_DECAY: f64 = 0.38;
 /// JODs that a tile may lose, unless one says otherwise. Where people stopped seeing *noise*, zones had lost as much,
 /// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/criteria.md`).
 pub const DEFAULT_JODS_LOST: f64 = 0.3;
-/// Of 20 tiles that stop by an estimate, 19 have lost less than so many times as much as it says: chosen in the tiles of two
-/// scenes, and tried in those of fourteen others (`docs/denoising.md`). An estimate errs both ways, and a tile stops where it
-/// errs to the low side.
-pub const ESTIMATE_ERRS_BY: f64 = 1.5;
 /// Edge of the square that a smaller tile is judged in, in pixels: as [`noisefloor::tune::squares`].
 const SQUARE: usize = 64;
 /// Contrasts between which an error is sought that is just allowed, and how well it is found.
@@ -188,9 +184,6 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         true
     }
 }
-
-/// The error in a rectangle of the picture.
-pub(crate) type PartError = (Tile, DenoisedError);
 
 /// What is found of a tile.
 struct Judged {

@@ -48,11 +48,9 @@ mod oidn;
 mod parts;
 mod record;
 
-pub use criterion::{
-    DEFAULT_JODS_LOST, DenoisedQuality, ESTIMATE_ERRS_BY, spp_with_denoising, spp_without_denoising,
-};
+pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising};
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
-pub use estimate::{DenoisedError, DenoisedExcess, DenoisedHalves};
+pub use estimate::{DenoisedError, DenoisedExcess, DenoisedHalves, ESTIMATE_ERRS_BY};
 #[cfg(feature = "oidn")]
 pub use oidn::{OIDN, Oidn};
 pub use record::DenoisedRecord;

@@ -1,7 +1,6 @@
 //! What is known of the verdicts on denoised pictures besides the verdicts.
 
-use crate::criterion::PartError;
-use crate::estimate::DenoisedError;
+use crate::estimate::{DenoisedError, PartError};
 use crate::parts::holds;
 use noisefloor::{Rgb, Tile, TileGrid};
 

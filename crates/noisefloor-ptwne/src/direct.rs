@@ -3,8 +3,9 @@
 use crate::accel::Stack;
 use crate::bsdf;
 use crate::camera::Lens;
+use crate::geometry::Intersection;
 use crate::guide::{Contributions, Guide, GuidedSample};
-use crate::intersection::{Intersection, OpacityTest};
+use crate::intersection::OpacityTest;
 use crate::light::LightSample;
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3};

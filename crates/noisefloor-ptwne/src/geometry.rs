@@ -1,5 +1,6 @@
 //! Surfaces in groups, and what they have at their corners.
 
+use crate::material::CompiledMaterial;
 use crate::math::Vec3;
 use crate::texture::{Coordinates, twice};
 
@@ -148,4 +149,26 @@ fn rings(direction: u32, u: f32, v: f32) -> [f32; 2] {
     let turn = v.atan2(u) * (0.5 * std::f32::consts::FRAC_1_PI);
     let turn = if turn < 0.0 { turn + 1.0 } else { turn };
     [(u * u + v * v).sqrt(), if direction == RINGS { 1.0 - turn } else { turn }]
+}
+
+/// Where a ray hit a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Intersection<'a> {
+    pub(crate) position: Vec3,
+    /// The geometric normal, on the side of the ray's origin.
+    pub(crate) flat: Vec3,
+    /// The shading normal, on the same side.
+    pub(crate) normal: Vec3,
+    /// Whether the ray hit the front.
+    pub(crate) front: bool,
+    pub(crate) uv: Coordinates,
+    /// Along growing u, of any length; 0 if that does not count.
+    pub(crate) along: Vec3,
+    /// The colour between its corners; white if they have none.
+    pub(crate) tint: Vec3,
+    pub(crate) material: &'a CompiledMaterial,
+    /// The index of its light; [`NO`] if it does not shine.
+    pub(crate) light: u32,
+    /// The least distance by which origins of scattered rays are moved off it.
+    pub(crate) offset: f32,
 }

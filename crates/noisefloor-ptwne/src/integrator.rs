@@ -2,7 +2,8 @@
 
 use crate::accel::{Hit, Stack};
 use crate::bsdf;
-use crate::intersection::{Intersection, OpacityTest};
+use crate::geometry::Intersection;
+use crate::intersection::OpacityTest;
 use crate::light::{LightSample, Prospect, Receiver};
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3, power_heuristic};

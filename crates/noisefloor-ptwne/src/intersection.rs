@@ -2,7 +2,7 @@
 
 use crate::accel::{Hit, HitShape, Spot, Stack};
 use crate::bsdf::{Glossy, LobesAt, MIN_ROUGHNESS, RoughGlass, schlick};
-use crate::geometry::{Group, NO, RINGS, RINGS_REVERSED};
+use crate::geometry::{Group, Intersection, NO, RINGS, RINGS_REVERSED};
 use crate::material::{Bsdf, CompiledMaterial};
 use crate::math::{Frame, Ray, Vec3};
 use crate::relief::{self, Relief};
@@ -26,28 +26,6 @@ pub(crate) enum OpacityTest {
     /// As ray `index` of a sequence: of every 2ᵏ consecutive rays, each surface stops its share to the
     /// nearest ray, and different surfaces stop different rays.
     Stratified { index: u32, seed: u64 },
-}
-
-/// Where a ray hit a surface.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Intersection<'a> {
-    pub(crate) position: Vec3,
-    /// The geometric normal, on the side of the ray's origin.
-    pub(crate) flat: Vec3,
-    /// The shading normal, on the same side.
-    pub(crate) normal: Vec3,
-    /// Whether the ray hit the front.
-    pub(crate) front: bool,
-    pub(crate) uv: Coordinates,
-    /// Along growing u, of any length; 0 if that does not count.
-    pub(crate) along: Vec3,
-    /// The colour between its corners; white if they have none.
-    pub(crate) tint: Vec3,
-    pub(crate) material: &'a CompiledMaterial,
-    /// The index of its light; [`NO`] if it does not shine.
-    pub(crate) light: u32,
-    /// The least distance by which origins of scattered rays are moved off it.
-    pub(crate) offset: f32,
 }
 
 impl Scene {

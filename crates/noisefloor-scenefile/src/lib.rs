@@ -11,6 +11,7 @@ mod error;
 mod files;
 mod gltf;
 mod indices;
+mod loaded;
 mod mesh;
 mod mitsuba;
 mod options;
@@ -19,25 +20,10 @@ mod picture;
 mod sky;
 
 pub use error::{Finding, LoadError, Place, Treatment, Warning, group_warnings};
+pub use loaded::Loaded;
 pub use options::LoadOptions;
 
-use noisefloor_ptwne::Scene;
 use std::path::Path;
-
-/// A scene from a file, and what the file says about how to render it.
-#[derive(Debug)]
-pub struct Loaded {
-    /// The scene.
-    pub scene: Scene,
-    /// Image size in pixels that the file asks for.
-    pub size: Option<(usize, usize)>,
-    /// Longest path, in segments, that the file asks for.
-    pub max_depth: Option<u32>,
-    /// Largest channel of a sample that the file asks for: brighter ones are scaled down to it.
-    pub clamp: Option<f32>,
-    /// What was ignored or replaced.
-    pub warnings: Vec<Warning>,
-}
 
 /// Loads the scene in `path`; its extension says which format: `.gltf`, `.glb`, `.xml` or `.pbrt`.
 ///
@@ -63,13 +49,6 @@ pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError
         loaded.warnings.push(Warning::ignored(Place::file(path), "the scene has no light: it is black"));
     }
     Ok(loaded)
-}
-
-/// What a scene is called: as its file, or as the folder if the file's name says no more than "scene".
-fn title(path: &Path) -> String {
-    let stem = path.file_stem();
-    let folder = path.parent().and_then(Path::file_name).filter(|_| stem.is_some_and(|s| s == "scene"));
-    folder.or(stem).unwrap_or_default().to_string_lossy().into_owned()
 }
 
 #[cfg(doctest)]

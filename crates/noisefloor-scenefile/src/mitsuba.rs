@@ -11,13 +11,14 @@ mod context;
 mod document;
 mod emitters;
 mod markup;
+mod parts;
 mod sensor;
 mod shapes;
 mod textures;
 mod xml;
 
-use crate::Loaded;
 use crate::error::{Errors, LoadError, Place};
+use crate::loaded::{Loaded, title};
 use crate::options::LoadOptions;
 use context::Context;
 use document::Document;
@@ -46,7 +47,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
 
     // What is in it: without a camera, too, so that all errors are found
     let View { camera, optics, size } = camera.unwrap_or_else(View::any);
-    let mut builder = SceneBuilder::new(crate::title(path), camera).map_err(context.refused(sensor))?;
+    let mut builder = SceneBuilder::new(title(path), camera).map_err(context.refused(sensor))?;
     builder.optics(optics).map_err(context.refused(sensor))?;
     let mut filling = Filling::new(builder);
     for shape in root.all("shape") {

@@ -23,8 +23,8 @@ mod state;
 mod textures;
 mod tokens;
 
-use crate::Loaded;
 use crate::error::LoadError;
+use crate::loaded::Loaded;
 use crate::options::LoadOptions;
 use std::path::Path;
 

@@ -3,8 +3,8 @@
 use super::Glossy;
 use super::fresnel::fresnel;
 use super::ggx::{Facets, Ggx};
+use crate::geometry::Intersection;
 use crate::geometry::NO;
-use crate::intersection::Intersection;
 use crate::material::{CompiledMaterial, Dialect, Gloss, Lobes, Material, MaterialOptions, Principled};
 use crate::math::{self, DELTA, Vec3};
 use crate::rng::{Key, Rng};

@@ -150,14 +150,6 @@ impl<'a> Asset<'a> {
     }
 }
 
-/// What to call an element: `mesh 3 "Table"`.
-pub(super) fn name(kind: &str, index: usize, name: Option<&str>) -> String {
-    match name {
-        Some(name) => format!("{kind} {index} {:?}", name.chars().take(60).collect::<String>()),
-        None => format!("{kind} {index}"),
-    }
-}
-
 /// The JSON and the binary chunk of a GLB file (glTF 2.0, §4.4).
 fn split_glb<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), LoadError> {
     let place = Place::part(path, "GLB header");

@@ -1,8 +1,9 @@
 //! Where a scene is seen from (glTF 2.0, §3.10).
 
-use super::asset::{Asset, name};
+use super::asset::Asset;
 use super::nodes::Placed;
 use super::notes::Notes;
+use super::parts::name;
 use crate::{LoadError, Place};
 use glam::DVec3;
 use gltf::json::camera::Type;

@@ -1,9 +1,9 @@
 //! Meshes that Draco compressed (KHR_draco_mesh_compression). They are inflated before anything is read: their
 //! numbers become buffers of the asset, and accessors point to them, as if the file had them so.
 
-use super::asset::{Asset, name};
-use super::mesh::{attribute, count};
-use super::mode;
+use super::asset::Asset;
+use super::mesh::{attribute, count, mode};
+use super::parts::{DRACO as NAME, name};
 use crate::files::has_memory;
 use crate::{LoadError, Place};
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, DracoError, ErrorKind, MeshDecoder};
@@ -16,7 +16,6 @@ use gltf::json::{Accessor, Index, Value, deserialize};
 use noisefloor_ptwne::MAX_SURFACES;
 use std::collections::{BTreeMap, HashMap};
 
-pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 /// Most bytes of a vertex, in all attributes of a compressed mesh: 16 of four words each have 256.
 const VERTEX_BYTES: u64 = 1024;
 /// Bytes that a vertex or a triangle takes while it is inflated, about: tables of neighbours, and the numbers twice.

@@ -1,8 +1,9 @@
 //! The light of a scene: `KHR_lights_punctual`, whether it is enough to see by, and a sky where it is not.
 
-use super::asset::{Asset, name};
+use super::asset::Asset;
 use super::nodes::Placed;
 use super::notes::Notes;
+use super::parts::name;
 use crate::{LoadError, Place};
 use glam::Vec3;
 use gltf::json::Index;

@@ -1,10 +1,10 @@
 //! Materials (glTF 2.0, §3.9) with their extensions.
 
-use super::asset::{Asset, name};
+use super::asset::Asset;
 use super::clearcoat::{self, Clearcoat, Coat};
 use super::gloss::Gloss;
-use super::mesh::Corners;
 use super::notes::Notes;
+use super::parts::{AddedMaterial, Corners, name};
 use super::texture::{Encoding, Textures, normal_info, set};
 use crate::{LoadError, Place};
 use gltf::json::extensions::material::PbrSpecularGlossiness;
@@ -24,19 +24,6 @@ const MAX_IOR: f32 = 4.0;
 
 /// `KHR_materials_specular`, which the types of the JSON leave among unknown extensions.
 const SPECULAR: &str = "KHR_materials_specular";
-
-/// A material in the scene.
-#[derive(Clone, Debug)]
-pub(super) struct AddedMaterial {
-    pub(super) id: MaterialId,
-    pub(super) emission: Option<Emission>,
-    /// Whether it shows its colour without any light.
-    pub(super) unlit: bool,
-    /// The sets of texture coordinates of its textures, if it has any.
-    pub(super) sets: [Option<u32>; 2],
-    /// Whether it has a map of normals, which lies along tangents.
-    pub(super) normal_map: bool,
-}
 
 /// Materials, added to the scene when first asked for.
 #[derive(Debug)]

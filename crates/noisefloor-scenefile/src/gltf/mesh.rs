@@ -2,7 +2,7 @@
 
 use super::accessor::{floats, indices};
 use super::asset::Asset;
-use super::material::AddedMaterial;
+use super::parts::{AddedMaterial, Corners};
 use crate::{LoadError, Place};
 use glam::{DAffine3, DMat3, DVec3};
 use gltf::json::accessor::Type;
@@ -38,14 +38,6 @@ pub(super) fn positions(
 ) -> Result<Vec<[f32; 3]>, LoadError> {
     let Some(positions) = attribute(primitive, Semantic::Positions) else { return Ok(vec![]) };
     floats(asset, positions, place)
-}
-
-/// What the corners of a mesh multiply its colour with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Corners {
-    Nothing,
-    Colours,
-    ColoursAndAlphas,
 }
 
 /// What a primitive has in `COLOR_0`.
@@ -125,6 +117,14 @@ fn colours_of(
     } else {
         (floats::<3>(asset, index, place)?.into_iter().map(colour).collect(), vec![])
     })
+}
+
+/// How the corners of a primitive make triangles.
+pub(super) fn mode(primitive: &Primitive, place: &Place) -> Result<Mode, LoadError> {
+    match primitive.mode {
+        Checked::Valid(mode) => Ok(mode),
+        Checked::Invalid => Err(place.clone().bad("its mode is not one of glTF's")),
+    }
 }
 
 /// Number of triangles of a mode that `corners` make.

@@ -1,6 +1,7 @@
 //! The hierarchy of nodes (glTF 2.0, §3.5).
 
-use super::asset::{Asset, name};
+use super::asset::Asset;
+use super::parts::name;
 use crate::{LoadError, Place};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use gltf::json::{Index, Node};

@@ -9,9 +9,9 @@ use std::fmt;
 /// read; of `KHR_materials_variants` the material without a variant is shown, as its specification has it.
 const KNOWN: &[&str] = &[
     #[cfg(feature = "draco")]
-    super::draco::NAME,
+    super::parts::DRACO,
     super::meshopt::NAME,
-    super::texture::WEBP,
+    super::parts::WEBP,
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",

@@ -1,6 +1,6 @@
 //! The properties of glTF 2.0: what of them is read, and what else a file has.
 
-use super::asset::name;
+use super::parts::name;
 use gltf::json::{Root, Value, deserialize};
 
 /// The top-level arrays, and what one of their elements is called.

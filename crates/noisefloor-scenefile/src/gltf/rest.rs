@@ -2,9 +2,10 @@
 //! 2.0, §3.7.2.2 and §3.7.3).
 
 use super::accessor::floats;
-use super::asset::{Asset, name};
+use super::asset::Asset;
 use super::mesh::{Triangles, attribute};
 use super::nodes::Placed;
+use super::parts::name;
 use crate::{LoadError, Place};
 use glam::{DAffine3, DMat3, DVec3};
 use gltf::json::mesh::{Primitive, Semantic};

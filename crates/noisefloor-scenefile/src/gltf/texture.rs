@@ -1,8 +1,9 @@
 //! Textures: images, their samplers (glTF 2.0, §3.8), and `KHR_texture_transform`.
 
-use super::asset::{Asset, name};
+use super::asset::Asset;
 use super::gloss::Gloss;
 use super::notes::Notes;
+use super::parts::{WEBP, name};
 use crate::channels;
 use crate::picture::{self, Samples};
 use crate::{LoadError, Place};
@@ -19,8 +20,6 @@ use noisefloor_ptwne::{ImageTexture, MAX_TEXTURE_PIXELS, Pixels, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The extension of textures whose image is WebP.
-pub(super) const WEBP: &str = "EXT_texture_webp";
 /// Most pixels of all images together: a small file can make a large image, and a file can name many.
 const MAX_PIXELS: u64 = 4 * MAX_TEXTURE_PIXELS as u64;
 

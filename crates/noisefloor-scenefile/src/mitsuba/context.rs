@@ -1,10 +1,8 @@
 //! What the readers of all parts of a scene share: references, warnings, limits, and the leaves: numbers,
 //! names, points and transforms.
 
-use super::bsdfs::Surface;
 use super::document::{Document, unset};
-use super::shapes::Attribute;
-use super::textures::Raster;
+use super::parts::{Attribute, Raster, Surface};
 use super::xml::Element;
 use crate::bounds::Bounds;
 use crate::channels::Means;

@@ -1,7 +1,7 @@
 //! Shapes, groups of them and their instances, and what they fill.
 
-use super::bsdfs::{Body, Surface};
 use super::context::Context;
+use super::parts::{Attribute, Body, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
@@ -460,15 +460,6 @@ impl<'d> Context<'d> {
 }
 
 // Attributes of meshes, which are colours at their corners or on their faces.
-
-/// An attribute that a surface takes its colour from.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Attribute {
-    /// With `vertex_` or `face_` in front.
-    pub(super) name: String,
-    /// Factor on it.
-    scale: f64,
-}
 
 impl<'d> Context<'d> {
     /// The attribute that the surfaces in an element use, if they use one.

@@ -1,6 +1,7 @@
 //! Textures.
 
 use super::context::Context;
+use super::parts::Raster;
 use super::xml::Element;
 use crate::channels;
 pub(super) use crate::channels::linear;
@@ -325,22 +326,5 @@ pub(super) fn peak(texture: &Texture) -> f32 {
         }
         // This reader makes no others
         _ => 1.0,
-    }
-}
-
-// A picture, ready to become textures.
-
-/// A picture, ready for textures.
-#[derive(Clone, Debug)]
-pub(super) struct Raster {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) pixels: Pixels,
-}
-
-impl Raster {
-    /// Width, height, and linear values.
-    pub(super) fn linear(&self) -> (usize, usize, Vec<Rgb>) {
-        (self.width, self.height, linear(&self.pixels))
     }
 }

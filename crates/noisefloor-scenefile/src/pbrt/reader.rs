@@ -5,11 +5,11 @@ use super::camera::View;
 use super::params::{Params, at};
 use super::state::{Definition, Object, Part, State};
 use super::tokens::{Kind, Tokens};
-use crate::Loaded;
 use crate::bounds::Bounds;
 use crate::channels::Means;
 use crate::error::{Errors, LoadError, Place, Warning};
 use crate::files::{self, Folder, MAX_FILE_BYTES, has_memory};
+use crate::loaded::{Loaded, title};
 use crate::options::LoadOptions;
 use flate2::read::GzDecoder;
 use glam::DMat4;
@@ -83,7 +83,7 @@ impl<'a> Reader<'a> {
             folder: Folder::of(path, options.root.as_deref(), options.identity()),
             state: State::new(place.clone()),
             view: View::default(),
-            builder: SceneBuilder::new(crate::title(path), View::anywhere()).map_err(refused)?,
+            builder: SceneBuilder::new(title(path), View::anywhere()).map_err(refused)?,
             named_materials: HashMap::new(),
             materials: HashMap::new(),
             kept: vec![],

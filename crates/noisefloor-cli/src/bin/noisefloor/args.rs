@@ -14,10 +14,10 @@ mod scenes;
 mod tune;
 mod verdicts;
 
-pub use calibrate::{CalibrateArgs, Simulated};
+pub use calibrate::CalibrateArgs;
 pub use config::expand;
 pub use doctor::DoctorArgs;
-pub use farm::{FarmArgs, FarmTask, MergeTask, PlanTask, RunTask};
+pub use farm::FarmArgs;
 pub use inspect::InspectArgs;
 pub use judge::JudgeArgs;
 pub use metrics::MetricsArgs;
@@ -25,7 +25,6 @@ pub use reference::ReferenceArgs;
 pub use render::RenderArgs;
 pub use scenes::{CheckArgs, ScenesCommand};
 pub use tune::TuneArgs;
-pub use verdicts::FIRST_DENOISED;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;

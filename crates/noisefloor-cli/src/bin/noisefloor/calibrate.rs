@@ -1,10 +1,18 @@
 //! `noisefloor calibrate`.
 
-use crate::args::Simulated;
 use noisefloor_cli::say::say;
 use noisefloor_eyes::{Eyes, Person};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+
+/// An observer made of numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Simulated {
+    pub factor: f64,
+    pub scatter: f64,
+    pub slips: f64,
+    pub seed: u64,
+}
 
 /// What is done: checked.
 #[cfg_attr(not(feature = "watch"), allow(dead_code, reason = "refused without web server"))]

@@ -1,9 +1,8 @@
 //! `noisefloor farm`: what a farm needs of this command, and what it says.
 
-use crate::args::{FarmTask, MergeTask, PlanTask, RunTask};
 use crate::job::{CriterionJob, Ready, RenderJob};
 use crate::output::{self, Output};
-use crate::render::{EACH, JOB, KeyExposure, ONE_SEED, eased, exposure_of};
+use crate::render::{EACH, JOB, KeyExposure, ONE_SEED, SequenceExposure, eased, exposure_of};
 use anyhow::{Context, bail};
 use indicatif::HumanDuration;
 use noisefloor::driver::{Clock, Progress};
@@ -15,8 +14,8 @@ use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::sources::{Resources, SourceKind};
 use noisefloor_cli::{note, say};
 use noisefloor_farm::{
-    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameSource, FrameState, News,
-    RenderFiles, Round, Slurm, Studio, StudioError, merge_shards,
+    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameRange, FrameSource, FrameState,
+    News, RenderFiles, Round, Slurm, Studio, StudioError, merge_shards,
 };
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
@@ -28,6 +27,39 @@ use std::time::Duration;
 
 /// What is missing is named so far.
 const MOST_NAMED: usize = 5;
+
+/// What a farm is asked to do: checked.
+pub enum FarmTask {
+    Plan(Box<PlanTask>),
+    Run(RunTask),
+    Merge(MergeTask),
+    Status { dir: PathBuf, json: bool },
+    Task { dir: PathBuf, round: usize, task: usize },
+    Step { dir: PathBuf, round: usize, sbatch: Vec<String> },
+}
+
+pub struct PlanTask {
+    pub dir: PathBuf,
+    pub frames: Option<FrameRange>,
+    pub tasks: usize,
+    pub keep: bool,
+    /// None to plan the next round of what is there.
+    pub render: Option<(FarmRender, SequenceExposure)>,
+}
+
+pub struct RunTask {
+    pub dir: PathBuf,
+    pub local: Option<usize>,
+    pub sbatch: Vec<String>,
+    pub wait: bool,
+    pub every: Duration,
+    pub quiet: bool,
+}
+
+pub enum MergeTask {
+    Farm(PathBuf),
+    Shards { shards: Vec<PathBuf>, out: PathBuf, force: bool },
+}
 
 /// A render that machines share.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -3,6 +3,7 @@
 mod denoised;
 mod exposure;
 mod forecast;
+mod frame_report;
 mod frames;
 mod progress;
 mod saving;

@@ -1,6 +1,6 @@
 //! `noisefloor calibrate`.
 
-use crate::calibrate::{AskJob, CalibrateTask};
+use crate::calibrate::{AskJob, CalibrateTask, Simulated};
 use clap::Args;
 use noisefloor_cli::refuse;
 use noisefloor_eyes::Eyes;
@@ -42,15 +42,6 @@ pub struct CalibrateArgs {
     /// Another name of this machine that browsers may use. Repeat for more.
     #[arg(long, value_name = "HOST")]
     allow_host: Vec<String>,
-}
-
-/// An observer made of numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Simulated {
-    pub factor: f64,
-    pub scatter: f64,
-    pub slips: f64,
-    pub seed: u64,
 }
 
 impl CalibrateArgs {

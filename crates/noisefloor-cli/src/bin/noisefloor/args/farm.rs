@@ -1,7 +1,7 @@
 //! `noisefloor farm`.
 
 use super::{Cli, Command, expand};
-use crate::farm::{self, FarmRender};
+use crate::farm::{self, FarmRender, FarmTask, MergeTask, PlanTask, RunTask};
 use crate::job::RenderRun;
 use crate::render::SequenceExposure;
 use anyhow::bail;
@@ -145,39 +145,6 @@ struct StepArgs {
     round: usize,
     #[arg(long, allow_hyphen_values = true)]
     sbatch: Vec<String>,
-}
-
-/// What a farm is asked to do: checked.
-pub enum FarmTask {
-    Plan(Box<PlanTask>),
-    Run(RunTask),
-    Merge(MergeTask),
-    Status { dir: PathBuf, json: bool },
-    Task { dir: PathBuf, round: usize, task: usize },
-    Step { dir: PathBuf, round: usize, sbatch: Vec<String> },
-}
-
-pub struct PlanTask {
-    pub dir: PathBuf,
-    pub frames: Option<FrameRange>,
-    pub tasks: usize,
-    pub keep: bool,
-    /// None to plan the next round of what is there.
-    pub render: Option<(FarmRender, SequenceExposure)>,
-}
-
-pub struct RunTask {
-    pub dir: PathBuf,
-    pub local: Option<usize>,
-    pub sbatch: Vec<String>,
-    pub wait: bool,
-    pub every: Duration,
-    pub quiet: bool,
-}
-
-pub enum MergeTask {
-    Farm(PathBuf),
-    Shards { shards: Vec<PathBuf>, out: PathBuf, force: bool },
 }
 
 fn tasks(text: &str) -> Result<usize, String> {

@@ -1,6 +1,6 @@
 //! `noisefloor render`: what stops a tile, and when it is judged.
 
-use crate::job::Limits;
+use crate::job::{FIRST_DENOISED, Limits};
 use clap::{Args, ValueEnum, ValueHint};
 use noisefloor::{Audience, Params, Schedule};
 use noisefloor_cli::options::{renderer::RendererArgs, values};
@@ -85,9 +85,6 @@ const TILE: usize = 64;
 /// Denoised pictures are judged by squares of 64 pixels. Many tiles cost other renderers much.
 const DENOISED_TILE: usize = 32;
 
-/// The first verdict on denoised halves of the built-in renderer, in samples per pixel: what two denoisings cost is worth
-/// more of its samples than of slower renderers', and earlier stops lose more (docs/benchmarks/tiles.md).
-pub const FIRST_DENOISED: u64 = 48;
 /// A quarter of the samples: twice the noise.
 const DRAFT: Audience = Audience { slope: 0.25, offset: 0.0 };
 const DEFAULT_LOST: f64 = noisefloor_denoise::DEFAULT_JODS_LOST;

@@ -1,6 +1,6 @@
 //! `render --denoise`: a criterion and the denoiser that it shares with the output.
 
-use crate::args::FIRST_DENOISED;
+use crate::job::FIRST_DENOISED;
 use crate::output::Denoised;
 use noisefloor::{ProgressiveSource, Session, SourceError, StoppingCriterion, source::FirstHits};
 use noisefloor_cli::say::say;

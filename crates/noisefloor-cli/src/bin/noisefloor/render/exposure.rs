@@ -104,7 +104,7 @@ pub fn exposure_of(folder: &Path) -> anyhow::Result<f32> {
         [key] => return Ok(key.exposure),
         _ => bail!("{}: that sequence has several exposures; name the folder of one frame", option()),
     }
-    let report = super::frames::read(folder);
+    let report = super::frame_report::read(folder);
     let report =
         report.with_context(option).context("no report.json of a render is there, or it is damaged")?;
     report

@@ -1,6 +1,6 @@
 //! `render --frames --forecast`: what the whole sequence takes, by some of its frames.
 
-use super::frames::FrameRow;
+use super::frame_report::FrameRow;
 use indicatif::FormattedDuration;
 use noisefloor_cli::files::write_json;
 use noisefloor_cli::say;

@@ -4,6 +4,7 @@
 
 use super::exposure::{self, KeyExposure, SequenceExposure, eased};
 use super::forecast;
+use super::frame_report::{FrameRow, read, row};
 use crate::job::{CriterionJob, RenderRun};
 use anyhow::Context;
 use indicatif::HumanDuration;
@@ -12,9 +13,8 @@ use noisefloor_cli::signals::{self, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::{note, say};
 use noisefloor_farm::FrameRange;
 use noisefloor_image::write_csv;
-use serde::{Deserialize, Serialize};
-use std::fs::{self, File};
-use std::io::{BufReader, Write};
+use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -55,34 +55,6 @@ pub fn one_frame() -> anyhow::Result<ExitCode> {
         signals::terminate_self();
     });
     super::render(&run, true)
-}
-
-/// One line of frames.csv.
-#[derive(Serialize)]
-pub(super) struct FrameRow {
-    pub(super) frame: u32,
-    /// Whether every tile has what it should have.
-    complete: bool,
-    /// Samples per pixel, on average.
-    pub(super) spp: f64,
-    /// With reading the scene, without writing files.
-    pub(super) seconds: f64,
-    unfamiliar_tiles: usize,
-}
-
-/// What report.json says.
-#[derive(Deserialize)]
-pub(super) struct FrameReport {
-    complete: bool,
-    width: usize,
-    height: usize,
-    samples: u64,
-    unfamiliar_tiles: usize,
-    seconds_before: f64,
-    #[serde(default)]
-    seconds_setup: Option<f64>,
-    seconds_total: Option<f64>,
-    pub(super) exposure: Option<f32>,
 }
 
 pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
@@ -194,18 +166,6 @@ fn elsewhere(run: &RenderRun) -> anyhow::Result<ExitStatus> {
     let ended = process.wait();
     drop(stdin);
     Ok(ended?)
-}
-
-pub(super) fn read(out: &Path) -> Option<FrameReport> {
-    serde_json::from_reader(BufReader::new(File::open(out.join("report.json")).ok()?)).ok()
-}
-
-fn row(frame: u32, report: &FrameReport) -> FrameRow {
-    let spp = report.samples as f64 / (report.width * report.height).max(1) as f64;
-    let this_run = report.seconds_setup.unwrap_or(0.0) + report.seconds_total.unwrap_or(0.0);
-    let seconds = report.seconds_before + this_run;
-    let FrameReport { complete, unfamiliar_tiles, .. } = *report;
-    FrameRow { frame, complete, spp, seconds, unfamiliar_tiles }
 }
 
 fn sum_up(out: &Path, rows: &[FrameRow]) -> anyhow::Result<()> {
