@@ -84,7 +84,8 @@ def check_places(page):
     faults = []
     for place, folder, path, names in PLACE.findall((ROOT / page).read_text()):
         crate = "noisefloor" if folder == "core" else f"noisefloor-{folder}"
-        where = ROOT / "crates" / crate / "src" / path
+        home = next((home for home in (ROOT / "crates", ROOT / "crates/lab") if (home / crate).exists()), ROOT)
+        where = home / crate / "src" / path
         # A module may be a file, or a folder beside it.
         files = [file for file in (where, where.with_suffix("")) if file.exists()]
         files = [rust for file in files for rust in ([file] if file.is_file() else sorted(file.rglob("*.rs")))]

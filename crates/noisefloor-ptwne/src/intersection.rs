@@ -3,7 +3,7 @@
 use crate::accel::{Hit, HitShape, Spot, Stack};
 use crate::bsdf::{Glossy, LobesAt, MIN_ROUGHNESS, RoughGlass, schlick};
 use crate::geometry::{Group, Intersection, NO, RINGS, RINGS_REVERSED};
-use crate::material::{Bsdf, CompiledMaterial};
+use crate::material::Bsdf;
 use crate::math::{Frame, Ray, Vec3};
 use crate::relief::{self, Relief};
 use crate::rng;

@@ -1,5 +1,6 @@
 //! A glTF file as it is: its JSON, and the bytes that it names.
 
+use super::parts::name;
 use super::{properties, uri};
 use crate::files::Folder;
 use crate::{LoadError, Place};

@@ -12,7 +12,7 @@ use super::{camera, light};
 use crate::{LoadError, Place};
 use glam::{DAffine3, DVec3};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
-use gltf::json::{Index, Skin};
+use gltf::json::{self, Index, Skin};
 use noisefloor_ptwne::{Camera, Mesh, SceneBuilder, SceneError};
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
@@ -208,7 +208,7 @@ impl Loader<'_> {
         &mut self,
         placed: &Placed<'_>,
         index: usize,
-        mesh: &Mesh,
+        mesh: &json::Mesh,
         called: &str,
     ) -> Result<Option<Rc<Shared>>, LoadError> {
         let shared = match self.shared.get(&index) {
@@ -240,7 +240,7 @@ impl Loader<'_> {
     }
 
     /// Adds what the nodes that show a mesh share.
-    fn object(&mut self, mesh: &Mesh, called: &str, place: &Place) -> Result<Shared, LoadError> {
+    fn object(&mut self, mesh: &json::Mesh, called: &str, place: &Place) -> Result<Shared, LoadError> {
         let refused = |cause| LoadError::Scene { place: place.clone(), cause };
         let weights = mesh.weights.as_deref().unwrap_or_default();
         let pose = Pose { to_world: &DAffine3::IDENTITY, joints: None, weights };

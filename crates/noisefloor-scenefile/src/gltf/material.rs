@@ -13,9 +13,7 @@ use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Value, extensions};
 use noisefloor::{Rgb, display::luminance};
-use noisefloor_ptwne::{
-    Emission, ImageTexture, Material, MaterialId, MaterialOptions, Relief, SceneBuilder, Texture,
-};
+use noisefloor_ptwne::{Emission, ImageTexture, Material, MaterialOptions, Relief, SceneBuilder, Texture};
 use std::collections::HashMap;
 
 /// Indices of refraction that the renderer takes for a material that is not transparent.

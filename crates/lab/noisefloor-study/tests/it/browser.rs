@@ -83,7 +83,7 @@ option = [
 
 /// A language written from right to left: the English texts, with those that the test reads in Arabic.
 fn arabic() -> String {
-    let mut text = include_str!("../../../noisefloor-pages/pages/languages/en.toml").to_owned();
+    let mut text = include_str!("../../../../noisefloor-pages/pages/languages/en.toml").to_owned();
     for (english, arabic) in [
         ("name = \"English\"", "name = \"العربية\""),
         ("direction = \"ltr\"", "direction = \"rtl\""),
