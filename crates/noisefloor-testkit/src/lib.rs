@@ -56,3 +56,9 @@ pub use noise::Noise;
 #[cfg(target_os = "linux")]
 pub use process::{is_running, resident_kib};
 pub use requirement::{Requirement, require, require_python, require_shared};
+
+use std::time::Duration;
+
+/// How long a test waits for what takes seconds: ten times what the slowest machine took. Whatever lasts longer hangs;
+/// nothing fails because a machine is slow.
+pub const HANG: Duration = Duration::from_secs(600);

@@ -1,5 +1,6 @@
 use crate::kit::{command, fail, json, run, stderr, succeed, text};
 use noisefloor_image::{read_exr, read_facts};
+use noisefloor_testkit::HANG;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -35,7 +36,7 @@ pub(crate) fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T
         if let Some(found) = found() {
             return found;
         }
-        assert!(began.elapsed() < Duration::from_secs(60), "{what} did not happen within a minute");
+        assert!(began.elapsed() < HANG, "{what} did not happen");
         std::thread::sleep(Duration::from_millis(20));
     }
 }

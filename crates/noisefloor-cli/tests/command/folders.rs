@@ -1,4 +1,5 @@
 use crate::kit::{command, fail, run, stderr, succeed, text, tiny};
+use noisefloor_testkit::HANG;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -67,7 +68,7 @@ fn one_folder_takes_one_render_at_a_time() {
     let mut first = command(&long).stdout(Stdio::null()).spawn().unwrap();
     let begun = Instant::now();
     while !folder.path().join("report.json").exists() {
-        assert!(begun.elapsed() < Duration::from_secs(30));
+        assert!(begun.elapsed() < HANG);
         std::thread::sleep(Duration::from_millis(20));
     }
     for more in [&["--force"], &["--resume"]] {

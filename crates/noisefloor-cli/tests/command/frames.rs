@@ -1,4 +1,5 @@
 use crate::kit::{column, command, fail, json, stderr, succeed, text};
+use noisefloor_testkit::HANG;
 use std::fs;
 use std::path::Path;
 use tempfile::{TempDir, tempdir};
@@ -311,7 +312,7 @@ fn a_killed_sequence_leaves_no_frame_rendering() {
     let wait = |what: &str, done: &dyn Fn() -> bool| {
         let began = std::time::Instant::now();
         while !done() {
-            assert!(began.elapsed().as_secs() < 120, "{what}");
+            assert!(began.elapsed() < HANG, "{what}");
             std::thread::sleep(std::time::Duration::from_millis(50));
         }
     };
@@ -341,21 +342,26 @@ fn a_killed_sequence_is_resumed_as_if_it_had_not_been() {
     };
     let (whole, out) = (folder.path().join("whole"), folder.path().join("out"));
     assert!(render(&whole, &[]).status().unwrap().success());
-    let mut killed = render(&out, &[]).stderr(std::process::Stdio::null()).spawn().unwrap();
     let lock = out.join("0001/.noisefloor.lock");
     let locked = || fs::File::open(&lock).is_ok_and(|lock| lock.try_lock().is_err());
-    let began = std::time::Instant::now();
-    while !locked() {
-        assert!(began.elapsed().as_secs() < 60, "the first frame begins");
-        std::thread::sleep(std::time::Duration::from_millis(2));
-    }
-    killed.kill().unwrap();
-    killed.wait().unwrap();
-    while locked() {
-        assert!(began.elapsed().as_secs() < 120, "the first frame ends");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    assert!(!out.join("exposure.json").exists(), "it was killed before its exposure was known");
+    let wait = |done: &dyn Fn() -> bool| {
+        let began = std::time::Instant::now();
+        while !done() {
+            assert!(began.elapsed() < HANG, "the first frame begins and ends");
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+    };
+    // A machine may take so long to come back here that the frame is done: then once more
+    let cut = (0..20).any(|_| {
+        drop(fs::remove_dir_all(&out));
+        let mut killed = render(&out, &[]).stderr(std::process::Stdio::null()).spawn().unwrap();
+        wait(&locked);
+        killed.kill().unwrap();
+        killed.wait().unwrap();
+        wait(&|| !locked());
+        !out.join("exposure.json").exists()
+    });
+    assert!(cut, "the sequence was never killed before its exposure was known");
     assert!(render(&out, &["--resume"]).status().unwrap().success());
     for frame in 1..=2 {
         let read = |out: &Path, name: &str| fs::read(out.join(format!("{frame:04}/{name}"))).unwrap();

@@ -2,6 +2,7 @@ use crate::kit::{FILES, command, fail, json, stderr, succeed, table, text};
 #[cfg(feature = "lab")]
 use crate::learn::Corpora;
 use noisefloor_image::{read_exr, read_picture};
+use noisefloor_testkit::HANG;
 use std::fs::File;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -20,14 +21,14 @@ fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
 }
 
-/// Waits until something is so, for 30 s at most.
+/// Waits until something is so.
 fn wait_for<T>(what: &str, mut test: impl FnMut() -> Option<T>) -> T {
     let begun = Instant::now();
     loop {
         if let Some(found) = test() {
             return found;
         }
-        assert!(begun.elapsed() < Duration::from_secs(30), "{what}: not within 30 s");
+        assert!(begun.elapsed() < HANG, "{what} did not happen");
         std::thread::sleep(Duration::from_millis(20));
     }
 }

@@ -1,5 +1,6 @@
 use crate::kit::{command, fail, run, stderr, text, tiny};
 use noisefloor_image::read_exr;
+use noisefloor_testkit::HANG;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::Stdio;
@@ -95,7 +96,7 @@ fn a_viewer_that_is_not_there_is_an_error_and_one_that_goes_is_not() {
 /// The reply to a GET: its status, and its body.
 fn get(address: SocketAddr, path: &str, host: &str) -> (u16, Vec<u8>) {
     let mut stream = TcpStream::connect(address).unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    stream.set_read_timeout(Some(HANG)).unwrap();
     write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
     let mut reply = Vec::new();
     stream.read_to_end(&mut reply).unwrap();

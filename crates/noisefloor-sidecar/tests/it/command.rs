@@ -1,6 +1,6 @@
 use noisefloor::{ProgressiveSource, Request, SourceError, Tile, TileGrid};
 use noisefloor_sidecar::{CommandError, CommandOptions, CommandSource};
-use noisefloor_testkit::require_python;
+use noisefloor_testkit::{HANG, require_python};
 use std::collections::HashSet;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ const SIZE: (usize, usize) = (20, 12);
 
 fn options(scene: Option<&str>) -> CommandOptions {
     let mut options = CommandOptions::default();
-    (options.scene, options.timeout) = (scene.map(PathBuf::from), Duration::from_secs(60));
+    (options.scene, options.timeout) = (scene.map(PathBuf::from), HANG);
     options
 }
 
@@ -148,7 +148,7 @@ fn a_command_leaves_nothing_and_takes_any_name() {
     source.sample(&[Request::new(tile(0, 0, 0, 4, 4), 0, 1)]).unwrap();
     let pid = std::fs::read_to_string(folder.path().join("log.fork")).unwrap();
     let pid = pid.parse().unwrap();
-    assert!(crate::life::gone_within(pid, Duration::from_secs(10)), "process {pid} is left behind");
+    assert!(crate::life::gone_within(pid, HANG), "process {pid} is left behind");
 
     let more = "x0={x0} x1={x1} y0={y0} y1={y1} exists={scene} how=paint";
     let mut source = CommandSource::new(&template(&python, folder.path(), more), options).unwrap();

@@ -73,7 +73,7 @@ fn a_hanging_process_costs_the_time_allowed_twice() {
     let begun = Instant::now();
     let (error, _) = failure(&fake);
     assert!(matches!(*cause(&error).cause, SidecarCause::Silent { .. }), "{error:?}");
-    assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
+    assert!(begun.elapsed() < Duration::from_secs(300), "{:?}", begun.elapsed());
 }
 
 /// One restart costs the batch in flight, and not its samples: they are those that the first process would

@@ -1,9 +1,8 @@
 use noisefloor::{Request, Rgb, Tile, TileGrid};
 use noisefloor_sidecar::{HostOptions, Job, Renderer, Sidecar, SidecarError};
-use noisefloor_testkit::require_python;
+use noisefloor_testkit::{HANG, require_python};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 use tempfile::TempDir;
 
 pub(crate) const FAKE: Renderer = Renderer {
@@ -36,7 +35,7 @@ impl Fake {
         let pids = folder.path().join("pids").display().to_string();
         let options = BTreeMap::from([("how".to_owned(), how.to_owned()), ("pids".to_owned(), pids)]);
         let mut job = Job::new(scene);
-        (job.timeout, job.seed) = (Duration::from_secs(60), 5);
+        (job.timeout, job.seed) = (HANG, 5);
         Some(Self { python, folder, options, job })
     }
 

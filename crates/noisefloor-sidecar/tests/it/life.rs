@@ -3,7 +3,7 @@
 
 use crate::kit::{Fake, pids, requests};
 use noisefloor::ProgressiveSource;
-use noisefloor_testkit::{is_running, require_python, resident_kib};
+use noisefloor_testkit::{HANG, is_running, require_python, resident_kib};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -44,14 +44,14 @@ fn no_child_of_a_renderer_outlives_its_source() {
         let pids = two_pids(&fake.folder.path().join("pids"));
         drop(source);
         assert!(pids.len() >= 2, "{how}: {pids:?}");
-        assert!(pids.into_iter().all(|pid| gone_within(pid, Duration::from_secs(5))), "{how}");
+        assert!(pids.into_iter().all(|pid| gone_within(pid, HANG)), "{how}");
     }
 }
 
 /// The renderer's number and that of its child, which comes a little later.
 fn two_pids(file: &Path) -> Vec<u32> {
     let begun = Instant::now();
-    while pids(file).len() < 2 && begun.elapsed() < Duration::from_secs(30) {
+    while pids(file).len() < 2 && begun.elapsed() < HANG {
         std::thread::sleep(Duration::from_millis(10));
     }
     pids(file)
@@ -91,7 +91,7 @@ fn parent(how: &str, folder: &Path, exits: bool) -> (Child, Vec<u32>) {
     let parent = command.spawn().unwrap();
     let ready = folder.join("child pids.ready");
     let begun = Instant::now();
-    while !ready.exists() && begun.elapsed() < Duration::from_secs(60) {
+    while !ready.exists() && begun.elapsed() < HANG {
         std::thread::sleep(Duration::from_millis(10));
     }
     let pids = pids(&file);
@@ -110,7 +110,7 @@ fn no_process_outlives_a_killed_parent() {
         parent.kill().unwrap();
         parent.wait().unwrap();
         for pid in pids {
-            assert!(gone_within(pid, Duration::from_secs(10)), "{how}: process {pid} is left behind");
+            assert!(gone_within(pid, HANG), "{how}: process {pid} is left behind");
         }
     }
 }
@@ -122,7 +122,7 @@ fn no_process_outlives_an_exit_after_end_all() {
     let (mut parent, pids) = parent("ignore the end", fake.folder.path(), true);
     assert_eq!(parent.wait().unwrap().code(), Some(1));
     for pid in pids {
-        assert!(gone_within(pid, Duration::from_secs(10)), "process {pid} is left behind");
+        assert!(gone_within(pid, HANG), "process {pid} is left behind");
     }
 }
 

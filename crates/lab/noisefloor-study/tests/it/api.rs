@@ -1,8 +1,8 @@
 use crate::kit::{Folder, Running, levels, public};
 use noisefloor_study::simulated::drive;
+use noisefloor_testkit::HANG;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
 
 /// One answer: status, headers in lower case, body.
 struct Answer {
@@ -14,7 +14,7 @@ struct Answer {
 /// Sends bytes as they are, and reads until the server closes.
 fn raw(server: &Running, bytes: &[u8]) -> Answer {
     let mut stream = TcpStream::connect(server.address).unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    stream.set_read_timeout(Some(HANG)).unwrap();
     // The server may answer and close before it has read everything
     drop(stream.write_all(bytes));
     let mut text = Vec::new();

@@ -3,6 +3,7 @@ use noisefloor_pages::http::Exposure;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::simulated::{Public, SpreadShape};
 use noisefloor_study::{Study, StudyServer};
+use noisefloor_testkit::HANG;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -198,7 +199,7 @@ impl Served {
         };
         let head = format!("{method} {path} HTTP/1.1\r\n{host}connection: close\r\n{length}{headers}\r\n");
         let mut stream = TcpStream::connect(self.address).unwrap();
-        stream.set_read_timeout(Some(std::time::Duration::from_secs(60))).unwrap();
+        stream.set_read_timeout(Some(HANG)).unwrap();
         // The server may answer and close before it has read everything
         drop(stream.write_all(&[head.as_bytes(), body].concat()));
         let mut bytes = Vec::new();
