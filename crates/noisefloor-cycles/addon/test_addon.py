@@ -120,7 +120,237 @@ def assert_same(one, other, samples, what=""):
     numpy.testing.assert_allclose(one, other, rtol=2 * samples * 2**-24, err_msg=what)
 
 
+def passes_of(engine, layer):
+    """All passes that a render has left, by name; rows from the bottom."""
+    result, found = engine.get_result(), {}
+    for each in result.layers[layer].passes:
+        flat = numpy.empty(result.resolution_x * result.resolution_y * each.channels, numpy.float32)
+        each.rect.foreach_get(flat)
+        found[each.name] = flat.reshape(result.resolution_y, result.resolution_x, each.channels)
+    return found
+
+
+class Passes:
+    """While it is open: what Cycles rendered, picture by picture, and what the add-on has made of that, by layer."""
+
+    def __enter__(self):
+        self.cycles, self.made, self.settings = {}, {}, []
+        self.before = hooks.original["render"], frame.Frame.finish, sampling.adapt
+
+        def render(engine, depsgraph):
+            layer = depsgraph.view_layer_eval.name
+            self.before[0](engine, depsgraph)
+            self.cycles.setdefault(layer, []).append(passes_of(engine, layer))
+
+        def finish(each):
+            maps = self.before[1](each)
+            self.made[each.layer] = passes_of(each.engine, each.layer)
+            return maps
+
+        def adapt(cycles, seed, threshold, samples):
+            self.settings.append((seed, threshold, samples))
+            self.before[2](cycles, seed, threshold, samples)
+
+        hooks.original["render"], frame.Frame.finish, sampling.adapt = render, finish, adapt
+        return self
+
+    def __exit__(self, *_):
+        hooks.original["render"], frame.Frame.finish, sampling.adapt = self.before
+
+
+def transparent(scene):
+    scene.render.film_transparent = True
+
+
+def shadows(scene):
+    transparent(scene)
+    bpy.data.objects["Plane"].is_shadow_catcher = True
+
+
+def apart(scene, name):
+    """Puts the cube into a collection of its own, which the layer has like this."""
+    cube, own = bpy.data.objects["Cube"], bpy.data.collections.new("own")
+    for collection in cube.users_collection:
+        collection.objects.unlink(cube)
+    scene.collection.children.link(own)
+    own.objects.link(cube)
+    setattr(scene.view_layers[0].layer_collection.children["own"], name, True)
+
+
+def glass(scene):
+    transparent(scene)
+    scene.cycles.film_transparent_glass = True
+    made = bpy.data.materials.new("glass")
+    made.use_nodes = True
+    own = made.node_tree.nodes["Principled BSDF"].inputs
+    own["Transmission Weight"].default_value, own["Roughness"].default_value = 1.0, 0.0
+    cube = bpy.data.objects["Cube"]
+    cube.data.materials.clear()
+    cube.data.materials.append(made)
+
+
+def groups(scene):
+    layer = scene.view_layers[0]
+    bpy.ops.scene.view_layer_add_lightgroup(name="key")
+    bpy.data.objects["Light"].lightgroup = "key"
+    assert [group.name for group in layer.lightgroups] == ["key"]
+
+
+def everything(scene):
+    """All passes that there are."""
+    layer = scene.view_layers[0]
+    for group in (layer, layer.cycles):
+        for prop in group.bl_rna.properties:
+            if prop.identifier.startswith("use_pass_") and prop.identifier != "use_pass_shadow_catcher":
+                setattr(group, prop.identifier, True)
+    aov = layer.aovs.add()
+    aov.name, aov.type = "Depth of mine", "VALUE"
+    cube = bpy.data.objects["Cube"]
+    cube.pass_index = 7
+    tree = cube.data.materials[0].node_tree
+    node, where = tree.nodes.new("ShaderNodeOutputAOV"), tree.nodes.new("ShaderNodeNewGeometry")
+    node.aov_name = "Depth of mine"
+    tree.links.new(where.outputs["Position"], node.inputs["Value"])
+
+
+def region(scene, crop):
+    render = scene.render
+    render.use_border, render.use_crop_to_border = True, crop
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.3, 0.85, 0.2, 0.75
+
+
+# Switches of Film, Visibility, View Layer and Output, by name
+SWITCHES = {
+    "none": lambda scene: None,
+    "transparent": transparent,
+    "glass": glass,
+    "exposure": lambda scene: setattr(scene.cycles, "film_exposure", 2.5),
+    "filter": lambda scene: setattr(scene.cycles, "pixel_filter_type", "BLACKMAN_HARRIS"),
+    "catcher": shadows,
+    "catcher with a sky": lambda scene: setattr(bpy.data.objects["Plane"], "is_shadow_catcher", True),
+    "catcher as a pass": lambda scene: (
+        shadows(scene),
+        setattr(scene.view_layers[0].cycles, "use_pass_shadow_catcher", True),
+    ),
+    "holdout": lambda scene: (transparent(scene), setattr(bpy.data.objects["Cube"], "is_holdout", True)),
+    "held out collection": lambda scene: (transparent(scene), apart(scene, "holdout")),
+    "indirect only": lambda scene: apart(scene, "indirect_only"),
+    "unseen": lambda scene: setattr(bpy.data.objects["Cube"], "visible_camera", False),
+    "no sky": lambda scene: setattr(scene.view_layers[0], "use_sky", False),
+    "material override": lambda scene: setattr(
+        scene.view_layers[0], "material_override", bpy.data.materials["Material"]
+    ),
+    "not denoised layer": lambda scene: setattr(scene.view_layers[0].cycles, "use_denoising", False),
+    "samples of the layer": lambda scene: setattr(scene.view_layers[0], "samples", 3),
+    "light groups": groups,
+    "all passes": everything,
+    "two layers": lambda scene: setattr(scene.view_layers.new("second"), "use_sky", False),
+    "border": lambda scene: region(scene, False),
+    "crop": lambda scene: region(scene, True),
+}
+
+
 class Addon(unittest.TestCase):
+    def test_every_switch_does_what_it_does_without_the_loop(self):
+        """By colour and alpha, in all passes: the mean of two pictures that Cycles renders by itself, with their seeds."""
+        for name, switch in SWITCHES.items():
+            with self.subTest(switch=name):
+                scene = room()
+                scene.render.resolution_x, scene.render.resolution_y = 96, 72
+                scene.noisefloor.max_samples = 64
+                switch(scene)
+                found, files = {}, {}
+                for denoised in (False, True):
+                    scene.cycles.use_denoising = denoised
+                    with Passes() as loop:
+                        bpy.ops.render.render(write_still=True)
+                    found[denoised], files[denoised] = loop.made, pixels(scene.render.filepath + ".exr")
+                layers = [layer.name for layer in scene.view_layers]
+                self.assertEqual(sorted(found[False]), sorted(layers))
+                # The same pictures by Cycles itself, whose noise was nowhere below its threshold
+                scene.noisefloor.use, scene.cycles.use_denoising = False, False
+                cycles = scene.cycles
+                cycles.use_adaptive_sampling, scene.cycles.use_layer_samples = True, "IGNORE"
+                with Passes() as plain:
+                    for cycles.seed, cycles.adaptive_threshold, cycles.samples in loop.settings[:2]:
+                        bpy.ops.render.render(write_still=True)
+                cycles.use_denoising, cycles.samples = True, 64
+                with Passes() as own:
+                    bpy.ops.render.render(write_still=True)
+                file = pixels(scene.render.filepath + ".exr")
+                for layer in layers:
+                    self.compare(layer, {key: value[layer] for key, value in found.items()}, plain.cycles[layer])
+                    self.assert_denoised(found[True][layer], own.cycles[layer][0])
+                for denoised, written in files.items():
+                    self.assertEqual(written.shape, file.shape)
+                    self.assertLess(numpy.abs(written - file).mean(), 0.03 * file.max(), (name, denoised))
+                    if name == "border":
+                        outside = (file == 0).all(axis=-1)
+                        self.assertGreater(outside.mean(), 0.5)
+                        self.assertTrue((written[outside] == 0).all())
+
+    def compare(self, layer, found, plain):
+        """What the loop has found of a layer, not denoised and denoised, with two pictures of Cycles."""
+        noisy = found[True].get("Noisy Image")
+        if layer == "ViewLayer" and noisy is None:
+            self.assertFalse(bpy.context.scene.view_layers[layer].cycles.use_denoising)
+            noisy = found[True]["Combined"]
+        for name, first in plain[0].items():
+            both = [first, plain[1][name]]
+            wanted = first if passes.LABELS.match(name) else sum(both) / 2
+            every = [found[False][name], noisy if name == "Combined" else found[True][name]]
+            if name == "Shadow Catcher":
+                every[1] = found[True]["Noisy Shadow Catcher"]
+            if name == "Debug Sample Count":
+                continue
+            for made in every:
+                # Cycles' threads add samples in any order, in float32; near 0, alpha and ratios are differences
+                numpy.testing.assert_allclose(made, wanted, rtol=1e-4, atol=1e-5, err_msg=f"{layer}: {name}")
+
+    def assert_denoised(self, made, own):
+        """Denoised as by Cycles, of which the samples are others."""
+        self.assertEqual(set(own) - set(made), set())
+        for name in ("Combined", "Shadow Catcher"):
+            if name in own:
+                off = numpy.abs(made[name] - own[name]).mean(axis=(0, 1))
+                self.assertTrue((off < 0.02 * max(own[name].max(), 1)).all(), (name, off))
+
+    def test_stereo_is_left_to_cycles(self):
+        scene = room()
+        scene.render.use_multiview = scene.cycles.use_denoising = True
+        with Passes() as both:
+            bpy.ops.render.render()
+        self.assertEqual(both.made, {})
+        self.assertIn("Noisy Image", both.cycles["ViewLayer"][0])
+
+    def test_noise_of_alpha_is_seen(self):
+        """Of a catcher's shadow, there is nothing but alpha: what lies behind shines through, here as bright as middle grey."""
+        scene, random = room(), numpy.random.default_rng(1)
+        scene.render.film_transparent, shown = True, display.table(scene)
+
+        def shadow():
+            picture = numpy.zeros((*SIZE[::-1], 4), numpy.float32)
+            picture[..., 3] = random.normal(0.5, 0.15, SIZE[::-1])
+            return picture
+
+        pair = shadow(), shadow()
+        judge = judging.Judge(scene, shown, None, False, True)
+        found = judge.excess([{"Combined": picture} for picture in pair]).ratio
+        grey = [numpy.repeat(0.18 * (1 - picture[..., 3:]), 3, axis=2).astype(numpy.float32) for picture in pair]
+        self.assertAlmostEqual(found, noisefloor.excess(*grey, params=settings.params(scene, shown)).ratio, places=4)
+        self.assertGreater(found, 1)
+
+    def test_maps_are_named_like_the_still(self):
+        scene = room()
+        scene.noisefloor.max_samples = 64
+        settings = scene.render.image_settings
+        settings.file_format = "PNG"
+        for name, stem in [("shot.png", "shot"), ("shot.v2", "shot.v20001"), ("other.PNG", "other")]:
+            scene.render.filepath = str(FOLDER / name)
+            bpy.ops.render.render(write_still=True)
+            self.assertTrue((FOLDER / f"{stem}-samples.png").exists(), sorted(FOLDER.iterdir()))
+        self.assertTrue((FOLDER / "shot.png").exists())
+
     def test_off_it_changes_nothing(self):
         scene = room()
         scene.noisefloor.use = False
@@ -607,7 +837,7 @@ zipfile.ZipFile(arguments[0]).extractall(FOLDER)
 sys.path.insert(0, str(FOLDER))
 import noisefloor_addon
 import noisefloor
-from noisefloor_addon import denoise, display, frame, hooks, judging, sampling, settings
+from noisefloor_addon import denoise, display, frame, hooks, judging, passes, sampling, settings
 
 noisefloor_addon.register()
 result = unittest.main(argv=["test_addon.py", *arguments[1:]], exit=False).result

@@ -16,7 +16,9 @@ from . import judging, passes, sampling
 from .host import rectangles
 
 SAMPLES, NOISE, LOST = "noisefloor Samples", "noisefloor Visible Noise", "noisefloor JOD Lost"
-NOISY, COUNT = "Noisy Image", "Debug Sample Count"
+COUNT = "Debug Sample Count"
+# Passes that Cycles denoises, with the letters of their channels, and what it calls them before
+DENOISED = [("Combined", "RGBA", "Noisy Image"), ("Shadow Catcher", "RGB", "Noisy Shadow Catcher")]
 COARSEST, FINEST = 0.2, 0.001
 # Edge of the cells in which squares of 64 pixels that overlap by half meet
 CELL = 32
@@ -60,7 +62,9 @@ class Frame:
         )
         self.film = self._film()
         self.fewest = self.scene.cycles.adaptive_min_samples
-        self.judge = judging.Judge(self.scene, shown, self.film)
+        self.denoises = self.scene.cycles.use_denoising and depsgraph.view_layer_eval.cycles.use_denoising
+        catches = any(instance.object.is_shadow_catcher for instance in depsgraph.object_instances)
+        self.judge = judging.Judge(self.scene, shown, self.film, self.denoises, catches)
         self.tuning = noisefloor.Tuning(threshold=(COARSEST, FINEST))
         self.halves = passes.Sums(*self.size), passes.Sums(*self.size)
         # The sum of 1/threshold² of the pictures that each cell has, and how far it is from what may be seen
@@ -91,7 +95,7 @@ class Frame:
         """Cycles is told to render what denoising and the weights of pictures need."""
         layer, wanted = depsgraph.view_layer_eval.cycles, [(COUNT, 1, "X")]
         layer.pass_debug_sample_count = True
-        if self.scene.cycles.use_denoising and self.judge.library is None:
+        if self.denoises and self.judge.library is None:
             self.engine.report(
                 {"WARNING"}, "noisefloor does not denoise: this Blender has no Open Image Denoise"
             )
@@ -219,9 +223,6 @@ class Frame:
         )
         self.cycles()
         pictures = passes.read(self.engine, self.layer, (width, height))
-        if NOISY in pictures:
-            # Where Cycles was to denoise, it leaves the picture for that empty
-            pictures["Combined"] = pictures[NOISY]
         return pictures, sampling.counts(pictures.pop(COUNT), self.fewest, threshold, samples)
 
     def _show(self, region):
@@ -237,11 +238,15 @@ class Frame:
         """Puts all passes into the result, with the two maps; returns the maps."""
         both = passes.Sums.joined(*self.halves)
         pictures, spp = both.means(), both.samples[..., 0]
-        if pictures:
-            if NOISY in pictures:
-                pictures[NOISY] = pictures["Combined"].copy()
-            if self.judge.library:
-                pictures["Combined"][..., :3] = self.judge.denoise(pictures)
+        if pictures and self.denoises:
+            for name, letters, noisy in DENOISED:
+                if name in pictures:
+                    pictures[noisy] = pictures[name].copy()
+                    self.engine.add_pass(noisy, len(letters), letters, layer=self.layer)
+        if pictures and self.judge.library:
+            pictures["Combined"] = self.judge.denoise(pictures)
+            if "Shadow Catcher" in pictures:
+                pictures["Shadow Catcher"] = self.judge.denoise_alone(pictures["Shadow Catcher"])
         pictures[COUNT] = spp / max(spp.max(), 1)
         left = numpy.full(self.size[::-1], numpy.nan, numpy.float32)
         if self.excess is not None:

@@ -22,6 +22,8 @@ from . import display, maps, passes
 from .frame import Frame
 
 original = {}
+# By which Blender, too, knows that a file has been named in full, beside its own
+SUFFIXES = {".jpg": [".jpg", ".jpeg"], ".tif": [".tif", ".tiff"]}
 
 
 class State:
@@ -34,6 +36,8 @@ class State:
         self.borrowed = self.frame = self.texture = None
         # How the picture is displayed
         self.shown = None
+        # The thread that is about to ask which passes a render has, and of which scene, if that render is ours
+        self.registering = None
         # Of a search for the threshold: whether pictures are wanted, those of each layer, and how a render ended
         self.wanted, self.rendered, self.ended = False, {}, None
 
@@ -45,9 +49,23 @@ def wanted(engine, depsgraph):
     return not engine.is_preview and depsgraph.scene_eval.noisefloor.use
 
 
+def update_render_passes(engine, scene, layer):
+    """The passes that a render will have. Ours denoises afterwards. Cycles, told not to denoise, merges the noisy passes of a
+    layer with those that it would denoise, and then leaves shadow catchers out of both."""
+    if state.registering != (threading.get_ident(), scene.name):
+        return original["update_render_passes"](engine, scene, layer)
+    import cycles
+
+    for name, channels, kind in cycles.engine.list_render_passes(scene, layer):
+        if name not in passes.NOISY:
+            engine.register_pass(scene, layer, name, len(channels), channels, kind)
+    return None
+
+
 def update(engine, data, depsgraph):
     """Before each layer. A session of ours must not show its batches, and one of Cycles' own has to show
     them."""
+    state.registering = None
     on = wanted(engine, depsgraph)
     if engine.session and getattr(engine, "noisefloor", False) != on:
         original["free"](engine)
@@ -144,7 +162,7 @@ def _render(engine, depsgraph):
         for name, picture in pictures.items():
             state.images[f"noisefloor {name}" + (f", {frame.layer}" if many else "")] = picture
     if frame.settings.write_maps:
-        stem = output(frame.scene) + (f"-{frame.layer}" if many else "")
+        stem = output(frame.scene, engine.is_animation) + (f"-{frame.layer}" if many else "")
         for name, picture in pictures.items():
             _write(f"{stem}-{name.replace(' ', '-')}.png", maps.png(picture, summary))
         _write(f"{stem}-noisefloor.txt", (summary + "\n").encode())
@@ -166,8 +184,12 @@ def _progress(frame):
     return text, share
 
 
-def output(scene):
+def output(scene, animated):
     """Path of the rendered frame without its extension; movies have one file for all frames."""
+    stem, suffix = os.path.splitext(bpy.path.abspath(scene.render.filepath))
+    if not animated and suffix.lower() in SUFFIXES.get(scene.render.file_extension, [scene.render.file_extension]):
+        # Blender gives a still that has been named in full no number
+        return stem
     path = bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current))
     stem = os.path.splitext(path)[0]
     return f"{stem}-{scene.frame_current:04}" if scene.render.is_movie_format else stem
@@ -204,6 +226,8 @@ def before_copy(scene, *_):
 
 @persistent
 def after_copy(scene, *_):
+    ours = scene.noisefloor.use and scene.render.engine == "CYCLES" and not scene.render.use_multiview
+    state.registering = (threading.get_ident(), scene.name) if ours and state.rendering else None
     if state.borrowed is not None:
         scene.render.use_persistent_data, state.borrowed = state.borrowed, None
 
@@ -226,8 +250,8 @@ def cancelled(scene, *_):
 
 
 def ended(scene):
-    after_copy(scene)
     state.rendering, state.status = False, None
+    after_copy(scene)
     if scene.noisefloor.use and scene.render.engine == "CYCLES":
         # Setting it, to whatever, frees what the engine has kept if it is off
         scene.render.use_persistent_data = scene.render.use_persistent_data
@@ -243,7 +267,7 @@ def deliver():
         images, state.images = state.images, {}
         still, state.still = bpy.data.scenes.get(state.still or ""), None
     if still and not still.render.is_movie_format:
-        path = output(still) + still.render.file_extension
+        path = output(still, False) + still.render.file_extension
         try:
             bpy.data.images["Render Result"].save_render(path, scene=still)
         except RuntimeError as error:
@@ -276,6 +300,12 @@ def tick():
 
 
 tick.shown = None
+METHODS = {
+    "update": update,
+    "update_render_passes": update_render_passes,
+    "render": render,
+    "draw": draw,
+}
 HANDLERS = [
     ("render_init", before_copy),
     ("render_pre", after_copy),
@@ -289,8 +319,9 @@ def register():
     import cycles
 
     engine = cycles.CyclesRender
-    original.update(update=engine.update, render=engine.render, draw=engine.draw, free=cycles.engine.free)
-    engine.update, engine.render, engine.draw = update, render, draw
+    original.update({name: getattr(engine, name) for name in METHODS}, free=cycles.engine.free)
+    for name, method in METHODS.items():
+        setattr(engine, name, method)
     for event, handler in HANDLERS:
         getattr(bpy.app.handlers, event).append(handler)
     if not bpy.app.background:
@@ -301,7 +332,8 @@ def unregister():
     import cycles
 
     engine = cycles.CyclesRender
-    engine.update, engine.render, engine.draw = original["update"], original["render"], original["draw"]
+    for name in METHODS:
+        setattr(engine, name, original[name])
     for event, handler in HANDLERS:
         getattr(bpy.app.handlers, event).remove(handler)
     if not bpy.app.background and bpy.app.timers.is_registered(tick):

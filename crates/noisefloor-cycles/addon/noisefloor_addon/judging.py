@@ -2,33 +2,54 @@
 it."""
 
 import noisefloor
+import numpy
 
 from . import denoise, settings
 
 ALBEDO, NORMAL = "Denoising Albedo", "Denoising Normal"
+# Radiance of what a transparent film is shown on: middle grey, where view transforms show a change of light most
+BACKDROP = numpy.float32(0.18)
 
 
 class Judge:
     """scene: whose settings say who looks, and what may be wrong. shown: how pictures are displayed, see display.py. film:
-    frames per second, or None for a still."""
+    frames per second, or None for a still. denoised: whether pictures are, if this Blender can. catches: whether objects
+    catch shadows, which lie in alpha, and are denoised there."""
 
-    def __init__(self, scene, shown, film=None):
-        self.settings, self.film = scene.noisefloor, film
-        self.library = denoise.library() if scene.cycles.use_denoising else None
+    def __init__(self, scene, shown, film, denoised, catches):
+        self.settings, self.film, self.catches = scene.noisefloor, film, catches
+        self.library = denoise.library() if denoised else None
+        self.transparent = scene.render.film_transparent
         self.oracle = settings.oracle(self.settings)
         self.params = settings.params(scene, shown, film)
         self.view = scene.view_settings.view_transform
 
     def denoise(self, passes):
-        """The denoised picture, of passes by name."""
-        colour = passes["Combined"][..., :3]
-        return denoise.denoise(self.library, colour, passes.get(ALBEDO), passes.get(NORMAL))
+        """The denoised picture, with alpha, of passes by name."""
+        made = passes["Combined"].copy()
+        made[..., :3] = denoise.denoise(
+            self.library, passes["Combined"][..., :3], passes.get(ALBEDO), passes.get(NORMAL)
+        )
+        if self.catches and self.transparent:
+            # Cycles does so with the light that a catcher lacks, of which alpha follows
+            alpha = numpy.repeat(passes["Combined"][..., 3:], 3, axis=2)
+            made[..., 3] = numpy.clip(self.denoise_alone(alpha)[..., 0], 0, 1)
+        return made
+
+    def denoise_alone(self, picture):
+        """A picture of three channels, denoised by itself: its edges are not those of albedo and normals."""
+        return denoise.denoise(self.library, picture)
+
+    def seen(self, picture):
+        """A picture with alpha, as it is judged."""
+        light = picture[..., :3]
+        return light + (1 - picture[..., 3:]) * BACKDROP if self.transparent else light
 
     def excess(self, pair):
         """How far the mean of two pictures, passes by name each, is from what may be seen; the time of the denoiser and
         of the vision model."""
-        noisy = [passes["Combined"][..., :3] for passes in pair]
-        denoised = tuple(self.denoise(passes) for passes in pair) if self.library else None
+        noisy = [self.seen(passes["Combined"]) for passes in pair]
+        denoised = tuple(self.seen(self.denoise(passes)) for passes in pair) if self.library else None
         try:
             return noisefloor.excess(
                 *noisy, oracle=self.oracle, params=self.params, denoised=denoised, lost=self.settings.lost
@@ -46,3 +67,4 @@ class Judge:
         else:
             what = f"{self.settings.people:.0%} of people"
         return f"{what}, {self.settings.viewing}, {self.view}{film}"
+

@@ -1,11 +1,15 @@
 """Pictures out of a render result of Blender's and into it, as arrays of shape (height, width, channels),
 rows from the top."""
 
+import re
+
 import bpy
 import numpy
 
+# What Cycles keeps beside passes that it denoises
+NOISY = ("Noisy Image", "Noisy Shadow Catcher")
 # Not a mean over samples, as the others are: what the first batch found stays
-LABELS = ("Depth", "Object Index", "Material Index", "IndexOB", "IndexMA", "Crypto")
+LABELS = re.compile(r"(Depth|Object Index|Material Index|IndexOB|IndexMA|Crypto(Object|Material|Asset)\d\d)$")
 
 
 def read(engine, layer, region):
@@ -57,7 +61,7 @@ class Sums:
         for name, picture in pictures.items():
             if name not in self.sums:
                 self.sums[name] = numpy.zeros((*self.samples.shape[:2], picture.shape[2]), numpy.float32)
-            if name.startswith(LABELS):
+            if LABELS.match(name):
                 numpy.copyto(self.sums[name][here], picture, where=first)
             else:
                 self.sums[name][here] += picture * samples
@@ -75,5 +79,5 @@ class Sums:
         """The passes by name; 0 where there are no samples."""
         samples = numpy.maximum(self.samples, 1)
         return {
-            name: total if name.startswith(LABELS) else total / samples for name, total in self.sums.items()
+            name: total if LABELS.match(name) else total / samples for name, total in self.sums.items()
         }

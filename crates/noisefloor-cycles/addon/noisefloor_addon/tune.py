@@ -25,7 +25,9 @@ class Search:
     """A search, step by step. Settings of the scene are borrowed while a picture is rendered, and given back."""
 
     def __init__(self, scene):
-        self.scene, self.denoised = scene, scene.cycles.use_denoising
+        # The layer that people see first stands for the frame
+        first = next((layer for layer in scene.view_layers if layer.use), None)
+        self.scene, self.denoised = scene, scene.cycles.use_denoising and first and first.cycles.use_denoising
         if self.denoised and denoise.library() is None:
             raise ValueError("this Blender has no Open Image Denoise: turn Denoise off")
         self.before, self.frames, self.film = scene.frame_current, [scene.frame_current], None
@@ -35,7 +37,8 @@ class Search:
             if not self.frames:
                 raise ValueError("no frame between the first and the last is marked: add markers in the timeline")
             self.film = frame.film_rate(scene)
-        self.judge = judging.Judge(scene, display.table(scene), self.film)
+        catches = any(each.is_shadow_catcher for each in bpy.data.objects)
+        self.judge = judging.Judge(scene, display.table(scene), self.film, self.denoised, catches)
         shot = scene.render
         self.size = tuple(
             side * shot.resolution_percentage // 100 for side in (shot.resolution_x, shot.resolution_y)
@@ -105,7 +108,6 @@ class Search:
         self.give_back()
         if not rendered:
             raise ValueError("nothing was rendered; is there a view layer that is used for rendering?")
-        # The layer that people see first stands for the frame
         self.pictures.append(next(iter(rendered.values())))
         if self.look.crop is None:
             self.seconds = [*self.seconds[-1:], time.monotonic() - self.begun]
