@@ -5,7 +5,8 @@
     docs/check_numbers.py --write                                    puts the recomputed numbers into the pages
 
 A page marks such a number, or a table of them, as `<!--=KEY-->×1.28<!--/-->`; the functions of `VALUES` say what
-each key is and which command makes it. All other numbers carry their date and command on the page.
+each key is and which command makes it. The README is read as it is, too, so its numbers are found by the words
+around them instead: `ANCHORS`. All other numbers carry their date and command on the page.
 
 A number may differ by one unit of its last digit or by 1 %: the solver ends within 1e-3 of the optimum, and on
 another machine `exp` may round otherwise on the way there. On one machine the numbers are the same every time.
@@ -24,9 +25,20 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGES = ["README.md", "docs/accuracy.md", "docs/guide.md", "docs/reference.md"]
+PAGES = ["docs/accuracy.md", "docs/guide.md", "docs/reference.md"]
 TABLE = "fixtures/human-table.csv"
 MARK = re.compile(r"<!--=(?P<key>[\w.-]+)-->(?P<text>.*?)<!--/-->", re.DOTALL)
+# Lines of README.md, with the key of each number in braces.
+ANCHORS = [
+    "People judged {table.zones} zones of {table.scenes} scenes.",
+    "| **noisefloor** | **{nested.error}** | {nested.bias} | {nested.early} | {nested.images} |",
+    "| one noise level for all scenes | {constant.error} | {constant.bias} | {constant.early} | {constant.images} |",
+    "| median of the *same* scene's other zones | {median.error} | {median.bias} | {median.early} | {median.images} |",
+    "The worst scene errs by {worst.error}; with other scenes like these, the error would lie between {nested.low} and "
+    "{nested.high}",
+    "asks; {nested.below} of the zones stop below what the mean person asked for.",
+]
+KEY = re.compile(r"\{([\w.]+)\}")
 NUMBER = re.compile(r"\d+(?:,\d{3})*(?:\.\d+)?")
 
 # What `evaluate --without` leaves out, and how accuracy.md calls the rest.
@@ -239,12 +251,32 @@ def check(page, write):
     return wrong
 
 
+def check_readme(write):
+    """Compares the numbers of the README. Returns what is wrong."""
+    path = ROOT / "README.md"
+    text = path.read_text()
+    wrong = []
+    for anchor in ANCHORS:
+        words = [re.escape(part) for part in KEY.split(anchor)[::2]]
+        found = re.search("(×?[0-9.,]+(?: %)?)".join(words), text)
+        if not found:
+            wrong.append(f"README.md: no line reads `{anchor}`; see ANCHORS in docs/check_numbers.py")
+            continue
+        right = KEY.sub(lambda key: VALUES[key[1]](), anchor)
+        if not agree(found[0], right):
+            wrong.append(f"README.md: it reads\n{found[0]}\nand computed is\n{right}")
+        text = text.replace(found[0], right)
+    if write:
+        path.write_text(text)
+    return wrong
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--noisefloor", default="target/debug/noisefloor", help="the command")
     parser.add_argument("--write", action="store_true", help="put the recomputed numbers into the pages")
     args = parser.parse_args()
     noisefloor = str((ROOT / args.noisefloor).resolve())
-    faults = [fault for page in PAGES for fault in check(page, args.write)]
-    print("\n".join(faults) or f"{', '.join(PAGES)}: all marked numbers are those of their commands")
+    faults = check_readme(args.write) + [fault for page in PAGES for fault in check(page, args.write)]
+    print("\n".join(faults) or f"README.md, {', '.join(PAGES)}: all marked numbers are those of their commands")
     sys.exit(1 if faults and not args.write else 0)
