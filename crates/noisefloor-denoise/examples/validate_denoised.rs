@@ -3,7 +3,7 @@
 //! `validate_denoised FOLDER…`: each folder has the stacks of `noisefloor-lab study stack` of two halves, `a` and
 //! `b`, and of the converged picture, `t`, whose two last levels are used. If it also has renders `ga` and `gb`
 //! with albedo.exr and normal.exr, all is done once more with these ("guided"). One line of CSV a tile and level
-//! goes to standard output. Denoised pictures are kept in the folder. docs/benchmarks/denoising.sh runs all of it.
+//! goes to standard output. Denoised pictures are kept in the folder. benchmarks/denoising.sh runs all of it.
 #![allow(clippy::print_stdout, reason = "it is what this example is for")]
 
 use noisefloor::{Rgb, Tile, TileGrid, ToneMapping, Viewing, source::FirstHits};

@@ -1,5 +1,5 @@
 //! Renders a scene file twice, independently: `halves SCENE WIDTHxHEIGHT SPP OUT`. Writes OUT-1.exr and
-//! OUT-2.exr, for comparison with another renderer (`docs/benchmarks/agreement.py`).
+//! OUT-2.exr, for comparison with another renderer (`benchmarks/agreement.py`).
 
 use noisefloor::{ProgressiveSource, Request, TileGrid};
 use noisefloor_image::{RenderLayers, write_exr};

@@ -1,7 +1,7 @@
 //! Rays a second, beside Embree's: docs/benchmarks/bvh.md.
 //!
 //! `NOISEFLOOR_RAYS=FOLDER/NAME cargo test --release -p noisefloor-ptwne --lib speed -- --ignored --nocapture`
-//! reads what docs/benchmarks/rays has written for a scene.
+//! reads what benchmarks/rays has written for a scene.
 
 use super::{Bvh, Hierarchy, Shape, Surface};
 use crate::math::Ray;
@@ -18,7 +18,7 @@ struct Told {
 }
 
 fn floats(stem: &str, end: &str) -> Vec<f32> {
-    let bytes = std::fs::read(format!("{stem}.{end}")).expect("docs/benchmarks/rays/ has written the file");
+    let bytes = std::fs::read(format!("{stem}.{end}")).expect("benchmarks/rays/ has written the file");
     bytes.as_chunks::<4>().0.iter().map(|four| f32::from_le_bytes(*four)).collect()
 }
 

@@ -2,7 +2,7 @@
 """What steps between verdicts do to the error against people: the table of verdicts.md.
 
     noisefloor-lab evaluate --table fixtures/human-table.csv --leave-one-scene-out --csv zones.csv
-    docs/benchmarks/steps.py zones.csv
+    benchmarks/steps.py zones.csv
 
 A tile stops at the first verdict at or after its predicted threshold. No luck is in it: the pictures of a zone are given.
 """

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What an adapter costs: 100 samples a pixel through noisefloor, against 100 samples by the renderer alone.
 
-    overhead.py --noisefloor ../../target/release/noisefloor [--size 256] [--batches 5] [--rounds 3] [RENDERER ...]
+    overhead.py --noisefloor ../target/release/noisefloor [--size 256] [--batches 5] [--rounds 3] [RENDERER ...]
 
 In turns, round by round: the renderer's own Python renders the Cornell box of fixtures/ N times after a first render that warms it
 up, each the whole picture with 100 samples in one call, and noisefloor renders the same scene tile by tile with N+1 batches of 100,
@@ -19,7 +19,7 @@ import sys
 import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-FIXTURES = os.path.normpath(os.path.join(HERE, "../../fixtures"))
+FIXTURES = os.path.normpath(os.path.join(HERE, "../fixtures"))
 TILE = 64
 
 MITSUBA = """

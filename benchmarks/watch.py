@@ -1,6 +1,6 @@
 """What a session says of samples that are wrong, and how often of samples that are right (docs/numerics.md).
 
-    pip install ./crates/noisefloor-python && python docs/benchmarks/watch.py [renders]
+    pip install ./crates/noisefloor-python && python benchmarks/watch.py [renders]
 
 Pictures of 128×128 pixels in tiles of 64, in the batches that the session asks for: a ramp with stripes, in three
 kinds of noise. In "fireflies" a hundredth of the samples has nearly all light.

@@ -3,7 +3,7 @@
     grep -v '^kitchen-view0\|^staircase2' fixtures/human-table.csv > nine.csv
     noisefloor-lab train --table nine.csv --out nine.nfm
     noisefloor-lab evaluate --table fixtures/human-table.csv --model nine.nfm --csv zones.csv
-    docs/benchmarks/one_factor.py zones.csv
+    benchmarks/one_factor.py zones.csv
 """
 
 import csv

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Time and memory of renders with a time limit, by size: docs/benchmarks/large.md. Needs GNU time.
-# usage: docs/benchmarks/large.sh NOISEFLOOR [SECONDS]
+# usage: benchmarks/large.sh NOISEFLOOR [SECONDS]
 set -euo pipefail
 noisefloor=$1 seconds=${2:-90}
 out=$(mktemp -d)

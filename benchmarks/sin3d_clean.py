@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Turns a SIN3D view rendered with few samples into the stack of a clean picture and its noise, in the layout of a corpus.
 
-    pip install mitsuba==3.9.1 mitsuba-oidn==0.1.2; docs/benchmarks/sin3d_clean.py VIEW BOX OUT
+    pip install mitsuba==3.9.1 mitsuba-oidn==0.1.2; benchmarks/sin3d_clean.py VIEW BOX OUT
 
 VIEW has zone<NN>/batch_<first>_<last>.exr, each the mean of those 64 samples, with the pixel filter of the study; BOX the
 same zones with a box filter, whose noise differs from pixel to pixel, as a denoiser expects. The clean picture is the

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """One model, several renderers: the same scene through every source, each stopped by the oracle.
 
-    renderers.py run --noisefloor ../../target/release/noisefloor --out OUT [--size 256x256] [SOURCE=SCENE ...]
+    renderers.py run --noisefloor ../target/release/noisefloor --out OUT [--size 256x256] [SOURCE=SCENE ...]
     renderers.py show OUT
 
 `run` renders every source twice, with two seeds, into OUT/SOURCE-SEED; what is there already is not rendered again. Without
@@ -22,7 +22,7 @@ import sys
 import numpy as np
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-FIXTURES = os.path.join(HERE, "../../fixtures")
+FIXTURES = os.path.join(HERE, "../fixtures")
 CFG = os.path.join(FIXTURES, "cornell-box/cornell-box.cfg")
 CORNELL_BOX = {
     "ptwne": "cornell-box",

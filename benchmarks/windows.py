@@ -2,7 +2,7 @@
 """Where people look, from the pictures themselves: predicts people's thresholds with the package `cvvdp` (no code of this
 project), by the root mean square of visible contrast in the worst window of each zone, and by means over the zone.
 
-    pip install cvvdp pillow scipy; docs/benchmarks/windows.py FOLDER-WITH-lisic9-AND-lisic-two
+    pip install cvvdp pillow scipy; benchmarks/windows.py FOLDER-WITH-lisic9-AND-lisic-two
 
 The stimulus of n samples beside a last picture of N that contains them is noise of m samples, 1/m = 1/n - 1/N. Noise is
 taken from an early picture and laid over the last one in the strength of the scene's mean threshold; contrast is in

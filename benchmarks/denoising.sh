@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Renders what docs/denoising.md compares, and prints its tables. Goes on where it was stopped.
 #
-#   docs/benchmarks/denoising.sh FOLDER [SCENE…]
+#   benchmarks/denoising.sh FOLDER [SCENE…]
 #
 # Needs `cargo build --release --all-features --bin noisefloor --example validate_denoised`, Open Image Denoise
 # (`noisefloor doctor --install oidn`) and, for the tables, Python with numpy. About four minutes a scene on one core.
@@ -12,7 +12,7 @@ shift
 scenes=("$@")
 [ $# -gt 0 ] || scenes=(cornell-box courtyard glass-spheres softbox arcade door-ajar lanterns plates bulb)
 here=$(cd "$(dirname "$0")" && pwd)
-built=${CARGO_TARGET_DIR:-$here/../../target}/release
+built=${CARGO_TARGET_DIR:-$here/../target}/release
 
 # Two independent halves and the converged picture, in one call each: what is there is finished
 stack() {

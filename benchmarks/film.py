@@ -3,11 +3,11 @@
 command, which is what is measured).
 
     pip install cvvdp==0.5.7 OpenEXR pillow
-    docs/benchmarks/film.py render FOLDER NOISEFLOOR     renders that are there are kept; on two cores an hour
-    docs/benchmarks/film.py table FOLDER NOISEFLOOR
-    docs/benchmarks/film.py denoised FOLDER NOISEFLOOR   needs mitsuba-oidn==0.1.2 as well
-    docs/benchmarks/film.py camera FOLDER NOISEFLOOR     cameras that move, in scenes of moving.py; on two cores an hour
-    docs/benchmarks/film.py forecast FOLDER NOISEFLOOR   what sequences take and what was forecast; needs only numpy
+    benchmarks/film.py render FOLDER NOISEFLOOR     renders that are there are kept; on two cores an hour
+    benchmarks/film.py table FOLDER NOISEFLOOR
+    benchmarks/film.py denoised FOLDER NOISEFLOOR   needs mitsuba-oidn==0.1.2 as well
+    benchmarks/film.py camera FOLDER NOISEFLOOR     cameras that move, in scenes of moving.py; on two cores an hour
+    benchmarks/film.py forecast FOLDER NOISEFLOOR   what sequences take and what was forecast; needs only numpy
 
 Frames are renders of a still view with one seed each. The truth is the mean of all of them, each by its samples. All are
 shown by Reinhard's operator at the exposure of the truth, in 8 bits. Of a film, what is lost is pooled over its frames as
