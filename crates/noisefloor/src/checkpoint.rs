@@ -174,7 +174,10 @@ impl Checkpoint<'_> {
         same("job", self.job.to_string(), job.to_owned())?;
         source.change_since(&self.source).map_or(Ok(()), Err)?;
         same("criterion", self.criterion.clone(), criterion.to_owned())?;
-        if let Some((what, kept, now)) = changed_param(&self.params, params) {
+        // More samples may be allowed than before
+        let more = self.params.max_spp.max(params.max_spp);
+        if let Some((what, kept, now)) = changed_param(&self.params.clone().with_max_spp(more), params) {
+            let kept = if what == MOST_SPP { self.params.max_spp.to_string() } else { kept };
             return Err(CheckpointError::Other { what, kept, now });
         }
         let size = |film: &Film| format!("{}×{} pixels", film.grid().width(), film.grid().height());
@@ -205,6 +208,9 @@ impl Checkpoint<'_> {
     }
 }
 
+/// The parameter that may grow.
+const MOST_SPP: &str = "most samples per pixel";
+
 /// The first parameter that differs, as it was and as it is.
 fn changed_param(kept: &Params, now: &Params) -> Option<(&'static str, String, String)> {
     let words = |params: &Params| {
@@ -218,7 +224,7 @@ fn changed_param(kept: &Params, now: &Params) -> Option<(&'static str, String, S
             ("viewing", viewing.to_string()),
             ("schedule", schedule_in_words(*schedule)),
             ("fewest samples per pixel", min_spp.to_string()),
-            ("most samples per pixel", max_spp.to_string()),
+            (MOST_SPP, max_spp.to_string()),
             ("number of verdicts in a row", consecutive.to_string()),
             ("tone mapping", format!("{tone_mapping:?}")),
         ]

@@ -84,6 +84,28 @@ fn a_run_that_was_broken_off_goes_on_to_the_bit() {
     }
 }
 
+/// Resumed with a larger limit, a finished render goes on; where verdicts come at the same samples whatever the limit, as
+/// one that was never limited. A smaller limit is refused.
+#[cfg(feature = "bundled-model")]
+#[test]
+fn a_finished_run_goes_on_with_more_samples() {
+    let with =
+        |max_spp| Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params().with_max_spp(max_spp));
+    let mut whole = with(400).unwrap();
+    whole.run(|_, _| ()).unwrap();
+    let mut limited = with(100).unwrap();
+    limited.run(|_, _| ()).unwrap();
+    assert!(limited.session().stops().any(|stop| stop.reason == crate::StopReason::MaxSpp));
+    let bytes = kept(&limited);
+    let mut resumed = with(400).unwrap().resume("noise", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+    assert!(!resumed.session().is_done());
+    resumed.run(|_, _| ()).unwrap();
+    assert!(kept(&resumed) == kept(&whole));
+    let smaller = with(80).unwrap().resume("noise", Checkpoint::read(&bytes[..]).unwrap());
+    let words = smaller.map(drop).unwrap_err().to_string();
+    assert!(words.contains("its most samples per pixel is 100, not 80"), "{words}");
+}
+
 /// What may be wrong with a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Habit {

@@ -1,9 +1,10 @@
 //! Snapshots of sessions.
 
-use super::Session;
+use super::{Goal, Session};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::StoppingCriterion;
-use crate::session::Stop;
+use crate::params::Params;
+use crate::session::{Stop, StopReason};
 use std::borrow::Cow;
 
 impl<C: StoppingCriterion> Session<C> {
@@ -29,7 +30,9 @@ impl<C: StoppingCriterion> Session<C> {
     }
 
     /// Resumes another session of the same job where it stood. Tiles that were ended by a limit or a failure
-    /// are open again; those that have converged, or have as many samples as are allowed, are not.
+    /// are open again; those that have converged, or have as many samples as are allowed, are not. More samples may be
+    /// allowed than before ([`Params::max_spp`](crate::Params::max_spp)): tiles that ended at the old limit are open for
+    /// their next verdict then, which need not come where it would have come with the new limit from the start.
     ///
     /// If the same samples are pushed, everything that follows equals the session that was not interrupted,
     /// to the bit: its [warnings](Session::warnings) and faults, too. Pixels share samples if either session
@@ -48,10 +51,16 @@ impl<C: StoppingCriterion> Session<C> {
             return Err(CheckpointError::Invalid("what it says of the samples is not of its picture"));
         }
         let mut tiles = checkpoint.tiles.into_owned();
-        for state in &mut tiles {
+        let film = checkpoint.film.into_owned();
+        let Params { schedule, max_spp, .. } = self.params;
+        for (tile, state) in tiles.iter_mut().enumerate() {
+            let spp = film.spp(tile);
+            if state.stop.is_some_and(|stop| stop.reason == StopReason::MaxSpp) && spp < max_spp {
+                state.stop = None;
+                state.goal = Goal::Verdict { spp: schedule.next(spp, None, 1.0).min(max_spp), streak: 0 };
+            }
             state.stop = state.stop.filter(|stop: &Stop| stop.reason.is_final());
         }
-        let film = checkpoint.film.into_owned();
         let Checkpoint { display, settling, .. } = checkpoint;
         Ok(Self { film, tiles, display, settling, displayed_reference: None, ..self })
     }
