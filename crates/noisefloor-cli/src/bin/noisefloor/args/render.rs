@@ -53,6 +53,7 @@ use std::time::Duration;
   noisefloor render --denoise oidn                   for a picture that will be denoised (fewer samples)
   noisefloor render --time 60 --against truth.exr    at most a minute; relMSE to a reference in timeline.csv
   noisefloor render --time 60 --resume               another minute of the render in the output folder
+  noisefloor render --max-spp 40000 --resume         more samples where the limit was reached
   noisefloor render --frames 1-240 --fps 24 'shots/hall.{frame:04}.xml'   a film, into out/hall/0001 and so on
   noisefloor render --config shot.toml --preset draft     options from a file; a quick look
   noisefloor render --watch                          the picture so far, in a browser
@@ -69,7 +70,7 @@ pub struct RenderArgs {
     time: Option<Duration>,
     /// Continue the render that Ctrl-C, --time or a kill interrupted in this output folder. Picture and
     /// stops are those of an uninterrupted render. Options must be the same, and so must the contents of
-    /// the scene and of all files that it reads. Works with sources that repeat their samples: `ptwne`,
+    /// the scene and of all files that it reads; but --max-spp may be larger, also of a finished render. Works with sources that repeat their samples: `ptwne`,
     /// `exr`, `cycles`, and `mitsuba` with libLLVM; and with the oracle or `spp:N`.
     #[arg(long)]
     resume: bool,
