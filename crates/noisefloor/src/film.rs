@@ -4,7 +4,9 @@ use crate::display::exposure::{self, NoisyPixel};
 use crate::display::{Settled, ToneMapping, luminance};
 use crate::rgb::Rgb;
 use crate::source::{Request, Sequence};
-use crate::tile::{Tile, TileGrid};
+use crate::tile::{Tile, TileGrid, TilePixels};
+use multiversion::multiversion;
+use rayon::prelude::*;
 use thiserror::Error;
 
 mod planes;
@@ -29,6 +31,9 @@ struct Half {
 
 const CARRY: f64 = 65_536.0;
 
+/// Rows of the picture that a thread adds to at once.
+const BAND: usize = 16;
+
 /// Distance of neighbouring f32 numbers around `x`; 0 for subnormal `x`.
 fn ulp(x: f32) -> f64 {
     f64::from(f32::from_bits(x.to_bits() & 0x7f80_0000)) * f64::from(f32::EPSILON)
@@ -40,23 +45,7 @@ impl Half {
     }
 
     fn rejected(&self, pixel: usize) -> u64 {
-        self.rejected.get(pixel).map_or(0, |&r| u64::from(r))
-    }
-
-    /// Adds the mean of `spp` new samples to a pixel that had `before` valid ones.
-    #[inline]
-    fn add(&mut self, pixel: usize, value: Rgb, spp: u64, before: u64) {
-        let weight = spp as f64 / (before + spp) as f64;
-        let stored = self.mean[pixel].iter_mut().zip(&mut self.carry[pixel]);
-        for ((mean, carry), value) in stored.zip(value) {
-            let old = f64::from(*mean) + f64::from(*carry) * ulp(*mean) / CARRY;
-            let new = old + (f64::from(value) - old) * weight;
-            *mean = new as f32;
-            let step = ulp(*mean);
-            let rest = if step > 0.0 { (new - f64::from(*mean)) / step * CARRY } else { 0.0 };
-            // Rounds, without the call that `round` is; within ±2¹⁵, and `as` saturates at the upper end
-            *carry = (rest + 0.5f64.copysign(rest)) as i16;
-        }
+        rejected(&self.rejected, pixel)
     }
 
     fn reject(&mut self, pixel: usize, spp: u64) {
@@ -65,6 +54,109 @@ impl Half {
         }
         let spp = u32::try_from(spp).unwrap_or(u32::MAX);
         self.rejected[pixel] = self.rejected[pixel].saturating_add(spp);
+    }
+}
+
+/// Samples that a pixel lost, by the counts of [`Half::rejected`].
+fn rejected(counts: &[u32], pixel: usize) -> u64 {
+    counts.get(pixel).map_or(0, |&count| u64::from(count))
+}
+
+/// Weight of a batch in the mean of all samples, of which `before` came before it.
+fn weight(spp: u64, before: u64) -> f64 {
+    spp as f64 / (before + spp) as f64
+}
+
+/// Adds means of new samples to numbers of a half, all with one weight.
+///
+/// Without branches, calls or divisions, so that it becomes vector instructions; the results are those of IEEE 754
+/// with any of them.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn add_numbers(mean: &mut [f32], carry: &mut [i16], new: &[f32], weight: f64) {
+    /// Adding and subtracting it rounds a small f64 to a whole one, to even at ties; the last bits of the sum are it.
+    const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
+    /// Exponent bits of 2¹⁰²³: less those of a power of two, they are its inverse's.
+    const INVERSE: u64 = 2046 << 52;
+    for ((mean, carry), &value) in mean.iter_mut().zip(carry).zip(new) {
+        let old = f64::from(*mean) + f64::from(*carry) * (ulp(*mean) / CARRY);
+        let new = old + (f64::from(value) - old) * weight;
+        *mean = new as f32;
+        let unit = ulp(*mean) / CARRY;
+        let rest = (new - f64::from(*mean)) * f64::from_bits(INVERSE.wrapping_sub(unit.to_bits()));
+        // Ties are rounded away from 0. Within ±2¹⁵, of which the upper end is no i16
+        let size = rest.abs();
+        let even = (size + WHOLE) - WHOLE;
+        let whole = (if size - even == 0.5 { even + 1.0 } else { even }).copysign(rest);
+        let whole = if whole > 32_767.0 { 32_767.0 } else { whole };
+        *carry = (if unit > 0.0 { whole } else { 0.0 } + WHOLE).to_bits() as i16;
+    }
+}
+
+/// Rows of the picture whose film is added to as one: a band for each thread, within a row of tiles.
+struct Band<'a> {
+    /// The first row, and how many.
+    y: usize,
+    rows: usize,
+    /// Width of the picture.
+    width: usize,
+    halves: Vec<HalfBand<'a>>,
+}
+
+struct HalfBand<'a> {
+    mean: &'a mut [Rgb],
+    carry: &'a mut [[i16; 3]],
+    /// Of all pixels of the picture.
+    rejected: &'a [u32],
+}
+
+/// New samples of one tile.
+#[derive(Clone, Copy)]
+struct TileBatch<'a> {
+    tile: Tile,
+    pixels: TilePixels<'a>,
+    spp: u64,
+    /// The half they belong to, and the samples that it has.
+    half: usize,
+    had: u64,
+}
+
+/// What a film found in new samples.
+#[derive(Default)]
+struct Found {
+    /// Pixels with negative luminance.
+    below_zero: u64,
+    /// Pixels that are not finite, with their half.
+    lost: Vec<(usize, usize)>,
+}
+
+impl Band<'_> {
+    /// Adds a row of new means to the half that they belong to.
+    fn add_row(&mut self, y: usize, batch: &TileBatch<'_>, found: &mut Found) {
+        let &TileBatch { tile, spp, half, had, .. } = batch;
+        let new = batch.pixels.row(y - tile.y);
+        let from = (y - self.y) * self.width + tile.x;
+        let first = y * self.width + tile.x;
+        let HalfBand { mean, carry, rejected: lost } = &mut self.halves[half];
+        let (mean, carry) = (&mut mean[from..][..tile.width], &mut carry[from..][..tile.width]);
+        let numbers = new.as_flattened();
+        // A sum, because a search would end at the first and so not become vector instructions
+        let finite = numbers.iter().fold(true, |all, c| all & c.is_finite());
+        if finite && lost.is_empty() {
+            add_numbers(mean.as_flattened_mut(), carry.as_flattened_mut(), numbers, weight(spp, had));
+        } else {
+            for (i, ((mean, carry), value)) in mean.iter_mut().zip(carry).zip(new).enumerate() {
+                if value.iter().all(|c| c.is_finite()) {
+                    let before = had - rejected(lost, first + i);
+                    add_numbers(mean, carry, value, weight(spp, before));
+                } else {
+                    found.lost.push((half, first + i));
+                }
+            }
+        }
+        if numbers.iter().fold(false, |any, &c| any | (c < 0.0)) {
+            let finite = new.iter().filter(|value| value.iter().all(|c| c.is_finite()));
+            found.below_zero += finite.filter(|&&value| luminance(value) < 0.0).count() as u64;
+        }
     }
 }
 
@@ -171,28 +263,83 @@ impl Film {
     /// unchanged.
     pub fn add(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), FilmError> {
         let tile = self.check(tile, mean.len())?;
-        let [a, b] = self.counts[tile.index];
-        if spp == 0 {
-            return Err(FilmError::NothingNew { tile: tile.index, had: a + b, now: a + b });
+        self.check_new(tile.index, spp)?;
+        self.add_tiles(spp, &[tile], |tile| TilePixels::alone(tile, mean));
+        Ok(())
+    }
+
+    /// Adds the means of `spp` new samples per pixel to tiles, in the order of the grid, which pass
+    /// [`Film::check_new`]. Rows of the picture are distributed over threads.
+    pub(crate) fn add_tiles<'a>(
+        &mut self,
+        spp: u64,
+        tiles: &[Tile],
+        pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
+    ) {
+        let batch = |&tile: &Tile| {
+            let half = self.half_with_fewer(self.counts[tile.index]);
+            TileBatch { tile, pixels: pixels(tile), spp, half, had: self.counts[tile.index][half] }
+        };
+        let batches: Vec<TileBatch<'_>> = tiles.iter().map(batch).collect();
+        // One tile alone is not worth the way to other threads
+        let rows_at_once = if tiles.len() == 1 { usize::MAX } else { BAND };
+        let in_rows: Vec<&[TileBatch<'_>]> = batches.chunk_by(|a, b| a.tile.y == b.tile.y).collect();
+        let add = |(mut band, batches): (Band<'_>, &[TileBatch<'_>])| {
+            let mut found = Found::default();
+            for y in band.y..band.y + band.rows {
+                batches.iter().for_each(|batch| band.add_row(y, batch, &mut found));
+            }
+            found
+        };
+        let found: Vec<Found> = self.bands(&in_rows, rows_at_once).into_par_iter().map(add).collect();
+        for Found { below_zero, lost } in found {
+            self.negative += below_zero * spp;
+            self.rejected += lost.len() as u64 * spp;
+            lost.into_iter().for_each(|(half, pixel)| self.halves[half].reject(pixel, spp));
         }
-        Self::countable(tile, a + b, spp)?;
-        let half = self.half_with_fewer(self.counts[tile.index]);
-        let mut below_zero = 0;
-        for (row, values) in tile.rows(self.grid.width()).zip(mean.chunks_exact(tile.width)) {
-            for (pixel, &value) in row.zip(values) {
-                if value.iter().all(|c| c.is_finite()) {
-                    let before = self.counts[tile.index][half] - self.halves[half].rejected(pixel);
-                    self.halves[half].add(pixel, value, spp, before);
-                    below_zero += u64::from(luminance(value) < 0.0);
-                } else {
-                    self.halves[half].reject(pixel, spp);
-                    self.rejected += spp;
-                }
+        for TileBatch { tile, half, .. } in batches {
+            self.counts[tile.index][half] += spp;
+        }
+    }
+
+    /// Cuts the film into bands of at most so many rows, of those rows of tiles that get samples.
+    fn bands<'a, 'b>(
+        &'a mut self,
+        in_rows: &[&'b [TileBatch<'b>]],
+        rows_at_once: usize,
+    ) -> Vec<(Band<'a>, &'b [TileBatch<'b>])> {
+        let width = self.grid.width();
+        let mut bands: Vec<(Band<'_>, &[TileBatch<'_>])> = Vec::new();
+        for &batches in in_rows {
+            let Tile { y: top, height, .. } = batches[0].tile;
+            bands.extend((top..top + height).step_by(rows_at_once.min(height)).map(|y| {
+                let rows = rows_at_once.min(top + height - y);
+                (Band { y, rows, width, halves: Vec::with_capacity(2) }, batches)
+            }));
+        }
+        for Half { mean, carry, rejected } in &mut self.halves {
+            let (mut mean, mut carry, mut row) = (&mut mean[..], &mut carry[..], 0);
+            for (band, _) in &mut bands {
+                let (skip, take) = ((band.y - row) * width, band.rows * width);
+                let (of_mean, of_carry);
+                (of_mean, mean) = mean.split_at_mut(skip).1.split_at_mut(take);
+                (of_carry, carry) = carry.split_at_mut(skip).1.split_at_mut(take);
+                row = band.y + band.rows;
+                band.halves.push(HalfBand { mean: of_mean, carry: of_carry, rejected });
             }
         }
-        self.negative += below_zero * spp;
-        self.counts[tile.index][half] += spp;
-        Ok(())
+        bands
+    }
+
+    /// Checks that a tile can get `spp` new samples per pixel.
+    pub(crate) fn check_new(&self, tile: usize, spp: u64) -> Result<(), FilmError> {
+        let had = self.spp(tile);
+        let now = had.saturating_add(spp);
+        match spp {
+            0 => Err(FilmError::NothingNew { tile, had, now }),
+            _ if now < COUNTABLE => Ok(()),
+            _ => Err(FilmError::TooMany { tile, now }),
+        }
     }
 
     /// Adds the new samples in a running mean of `total` samples per pixel, for renderers that keep one of
@@ -239,12 +386,6 @@ impl Film {
             return Err(FilmError::Pixels { tile: tile.index, got: pixels, expected: tile.pixels() });
         }
         Ok(tile)
-    }
-
-    /// Checks that `spp` more samples can be counted.
-    fn countable(tile: Tile, had: u64, spp: u64) -> Result<(), FilmError> {
-        let now = had.saturating_add(spp);
-        if now < COUNTABLE { Ok(()) } else { Err(FilmError::TooMany { tile: tile.index, now }) }
     }
 
     /// Validates a film that was read, against an empty one of the same job.
@@ -360,8 +501,11 @@ impl Film {
     /// out.
     pub fn settle(&self, tone: &ToneMapping) -> Settled {
         let (grid, halves) = (self.grid, self.has_halves());
+        // Found once for each column and row
+        let columns: Vec<usize> = (0..grid.width()).map(|x| grid.index_at(x, 0)).collect();
+        let rows: Vec<usize> = (0..grid.height()).map(|y| grid.index_at(0, y)).collect();
         let pixel = |x: usize, y: usize| {
-            let [a, b] = self.pixel_halves(grid.index_at(x, y), y * grid.width() + x);
+            let [a, b] = self.pixel_halves(rows[y] + columns[x], y * grid.width() + x);
             let pixel = exposure::of_halves([a, b].map(|(mean, spp)| (mean, spp as f64)))?;
             Some(NoisyPixel { deviation: pixel.deviation.filter(|_| halves), ..pixel })
         };

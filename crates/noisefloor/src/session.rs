@@ -7,8 +7,9 @@ use crate::params::{Audience, Params, ParamsError};
 use crate::rgb::Rgb;
 use crate::source::SourceIdentity;
 use crate::source::{PixelNoise, Reference, Request};
-use crate::tile::{Tile, TileError, TileGrid};
+use crate::tile::{Tile, TileError, TileGrid, TilePixels};
 use crate::watch::{Fault, Warning, Watch};
+use rayon::prelude::*;
 use std::fmt;
 use thiserror::Error;
 
@@ -254,14 +255,12 @@ impl<C: StoppingCriterion> Session<C> {
     /// then.
     pub fn push(&mut self, tile: usize, spp: u64, mean: &[Rgb]) -> Result<(), SessionError> {
         let place = self.film.check(tile, mean.len())?;
-        self.watch.check_light(&self.film, place, spp, mean)?;
-        let shift = self.watch.compare(&self.film, place, spp, mean);
-        self.film.add(tile, spp, mean)?;
-        self.watch.see(place, spp, mean, shift);
-        Ok(())
+        self.push_tiles(spp, &[place], |tile| TilePixels::alone(tile, mean))
     }
 
-    /// Adds the mean of `spp` new samples per pixel of the whole image, row-major, to every open tile.
+    /// Adds the mean of `spp` new samples per pixel of the whole image, row-major, to every open tile. On all threads of
+    /// the rayon pool that it is called in, as verdicts are given: `pool.install(|| session.judge())` keeps both in a
+    /// pool of your own.
     ///
     /// # Errors
     /// [`SessionError::Image`] if its size is not the image's, and as of [`Session::push`]: tiles before the
@@ -272,13 +271,34 @@ impl<C: StoppingCriterion> Session<C> {
         if image.len() != expected {
             return Err(SessionError::Image { got: image.len(), expected });
         }
-        for tile in grid.tiles() {
-            if self.is_open(tile.index) {
-                let mean: Vec<Rgb> = tile.rows(grid.width()).flat_map(|row| image[row].to_vec()).collect();
-                self.push(tile.index, spp, &mean)?;
-            }
-        }
-        Ok(())
+        let open: Vec<Tile> = grid.tiles().filter(|tile| self.is_open(tile.index)).collect();
+        self.push_tiles(spp, &open, |tile| TilePixels::in_image(tile, image, grid.width()))
+    }
+
+    /// Adds new samples of tiles, in the order of the grid: those before the one that is refused. All that tiles
+    /// need not wait for each other with is distributed over threads, to the same bits.
+    fn push_tiles<'a>(
+        &mut self,
+        spp: u64,
+        tiles: &[Tile],
+        pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
+    ) -> Result<(), SessionError> {
+        let (film, watch) = (&mut self.film, &mut self.watch);
+        let glances: Vec<_> = tiles.par_iter().map(|&tile| watch.glance(tile, pixels(tile))).collect();
+        let refused = tiles.iter().zip(glances).enumerate().find_map(|(i, (&tile, glance))| {
+            let light = watch.check_light(film, tile, spp, pixels(tile), glance).map_err(SessionError::from);
+            let checked = light.and_then(|()| Ok(film.check_new(tile.index, spp)?));
+            checked.err().map(|error| (i, error))
+        });
+        let (accepted, refused) = match refused {
+            Some((i, error)) => (&tiles[..i], Err(error)),
+            None => (tiles, Ok(())),
+        };
+        let compared = |&tile: &Tile| (tile, watch.compare(film, tile, spp, pixels(tile)));
+        let compared: Vec<_> = accepted.par_iter().map(compared).collect();
+        film.add_tiles(spp, accepted, &pixels);
+        watch.see(compared, spp, pixels);
+        refused
     }
 
     /// Adds the new samples in a running mean of a tile; see [`Film::add_running`].

@@ -1,5 +1,6 @@
 //! The image as a grid of tiles.
 
+use crate::rgb::Rgb;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -58,6 +59,42 @@ impl Tile {
             let start = y * image_width + self.x;
             start..start + self.width
         })
+    }
+}
+
+/// The pixels of a tile, in an array of their own or in that of the whole picture.
+#[derive(Clone, Copy)]
+pub(crate) struct TilePixels<'a> {
+    /// From the first pixel of the tile on.
+    pixels: &'a [Rgb],
+    /// From one row to the next.
+    stride: usize,
+    width: usize,
+    height: usize,
+}
+
+impl<'a> TilePixels<'a> {
+    /// Of an array of the tile alone.
+    pub(crate) fn alone(tile: Tile, pixels: &'a [Rgb]) -> Self {
+        let Tile { width, height, .. } = tile;
+        Self { pixels, stride: width, width, height }
+    }
+
+    /// Of a picture, which is `stride` pixels wide.
+    pub(crate) fn in_image(tile: Tile, image: &'a [Rgb], stride: usize) -> Self {
+        let Tile { x, y, width, height, .. } = tile;
+        Self { pixels: &image[y * stride + x..], stride, width, height }
+    }
+
+    /// A row of the tile.
+    #[inline]
+    pub(crate) fn row(self, y: usize) -> &'a [Rgb] {
+        &self.pixels[y * self.stride..][..self.width]
+    }
+
+    /// All of its pixels, row by row.
+    pub(crate) fn iter(self) -> impl Iterator<Item = Rgb> + Clone {
+        (0..self.height).flat_map(move |y| self.row(y).iter().copied())
     }
 }
 

@@ -67,10 +67,12 @@ pub use light::{ImpossibleLight, LightCheck};
 use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::source::PixelNoise;
-use crate::tile::{Tile, TileGrid};
+use crate::tile::{Tile, TileGrid, TilePixels};
 use correlation::Sums;
 use group::TileWatch;
+use light::SeenLight;
 use points::Points;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shift::Shift;
 use std::fmt;
@@ -286,25 +288,33 @@ impl Watch {
         Points::new(self.grid)
     }
 
-    /// Whether a batch that fits its tile can be light at all, together with what the film has.
+    /// What is to be seen of a batch by itself, of those pixels that are watched.
+    pub(crate) fn glance(&self, tile: Tile, mean: TilePixels<'_>) -> SeenLight {
+        SeenLight::of(self.points().of(tile).map(|(x, y)| mean.row(y)[x]))
+    }
+
+    /// Whether a batch that fits its tile can be light at all, together with what the film has, after such a glance
+    /// at it.
     pub(crate) fn check_light(
         &mut self,
         film: &Film,
         tile: Tile,
         spp: u64,
-        mean: &[Rgb],
+        mean: TilePixels<'_>,
+        glance: SeenLight,
     ) -> Result<(), Fault> {
         // The watched pixels first, and all only if those look wrong
-        let Err(seen) = self.light.check_all(self.points().of(tile).map(|pixel| mean[pixel])) else {
+        let Err(seen) = self.light.check_seen(glance) else {
             return Ok(());
         };
         let checked = if matches!(seen, ImpossibleLight::NotFinite { .. }) {
-            self.light.check_all(mean.iter().copied())
+            self.light.check_all(mean.iter())
         } else {
             // New samples may be differences of stored pictures: all that there are have to be light together
             let had = film.spp(tile.index) as f64;
             let (old, new) = (had / (had + spp as f64), spp as f64 / (had + spp as f64));
-            self.light.check_all(tile.rows(self.grid.width()).flatten().zip(mean).map(|(pixel, new_mean)| {
+            let pixels = tile.rows(self.grid.width()).flatten().zip(mean.iter());
+            self.light.check_all(pixels.map(|(pixel, new_mean)| {
                 let before = film.pixel(tile.index, pixel);
                 std::array::from_fn(|c| (f64::from(before[c]) * old + f64::from(new_mean[c]) * new) as f32)
             }))
@@ -313,18 +323,40 @@ impl Watch {
     }
 
     /// What a batch says beside the picture that it is going to be added to.
-    pub(crate) fn compare(&self, film: &Film, tile: Tile, spp: u64, mean: &[Rgb]) -> Option<Shift> {
+    pub(crate) fn compare(&self, film: &Film, tile: Tile, spp: u64, mean: TilePixels<'_>) -> Option<Shift> {
         if self.shared {
             return None;
         }
         Shift::of(film, tile, self.tiles[tile.index].batches, spp, mean)
     }
 
-    /// Takes notice of a batch that was added, and of what it said before.
-    pub(crate) fn see(&mut self, tile: Tile, spp: u64, mean: &[Rgb], shift: Option<Shift>) {
-        let points = self.points();
-        let shift = shift.unwrap_or_default();
-        let watch = &mut self.tiles[tile.index];
+    /// Takes notice of batches that were added, of tiles in the order of the grid, and of what they said before.
+    pub(crate) fn see<'a>(
+        &mut self,
+        seen: Vec<(Tile, Option<Shift>)>,
+        spp: u64,
+        pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
+    ) {
+        let (points, shared) = (self.points(), self.shared);
+        let mut seen = seen.into_iter().peekable();
+        let watched = self.tiles.iter_mut().enumerate();
+        let watched: Vec<(&mut TileWatch, (Tile, Option<Shift>))> = watched
+            .filter_map(|(i, watch)| seen.next_if(|(tile, _)| tile.index == i).map(|of_it| (watch, of_it)))
+            .collect();
+        watched.into_par_iter().for_each(|(watch, (tile, shift))| {
+            Self::see_tile(watch, points, shared, tile, spp, pixels(tile), shift.unwrap_or_default());
+        });
+    }
+
+    fn see_tile(
+        watch: &mut TileWatch,
+        points: Points,
+        shared: bool,
+        tile: Tile,
+        spp: u64,
+        mean: TilePixels<'_>,
+        shift: Shift,
+    ) {
         watch.sums.shift.add(&shift);
         let batch = watch.batches;
         watch.batches += 1;
@@ -332,16 +364,16 @@ impl Watch {
         if group >= DENSE && !group.is_multiple_of(4) {
             return;
         }
-        let light = |pixel| points::light(mean, pixel);
+        let light = |place| points::light(mean, place);
         if group == 0 {
-            let values: Vec<Rgb> = points.of(tile).map(|pixel| mean[pixel]).collect();
+            let values: Vec<Rgb> = points.of(tile).map(|(x, y)| mean.row(y)[x]).collect();
             values.iter().for_each(|&value| watch.values.see(value));
             watch.see_values(values);
             watch.see(spp, points.at_first(tile).map(light).collect());
         } else {
             watch.see(spp, points.of(tile).map(light).collect());
         }
-        if let Some(found) = watch.compare(self.shared) {
+        if let Some(found) = watch.compare(shared) {
             watch.sums.add(&found);
         }
     }

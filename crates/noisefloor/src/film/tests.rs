@@ -84,7 +84,8 @@ fn stays_accurate_at_a_billion_samples() {
     for k in 0..batches {
         // Drifts upward, so that late batches matter: 0.5 … 1.5 with a ripple.
         let value = 0.5 + (k as f32) / (batches as f32) + ((k * 7919 % 1000) as f32 / 1000.0 - 0.4995) * 0.5;
-        half.add(0, [value; 3], 100, k * 100);
+        let (mean, carry) = (half.mean.as_flattened_mut(), half.carry.as_flattened_mut());
+        add_numbers(mean, carry, &[value; 3], weight(100, k * 100));
         plain += (value - plain) * (1.0 / (k + 1) as f32);
         sum += f64::from(value);
     }
@@ -157,4 +158,43 @@ fn means_of_huge_values_are_finite() {
     film.add(0, 1, &[[-3e38; 3]; 256]).unwrap();
     let mean = film.pixel(0, 0)[0];
     assert!((mean / 1.5e38 - 1.0).abs() < 1e-6, "{mean}");
+}
+
+/// What [`add_numbers`] does to one number, as its documentation puts it: in f64, with the division and the rounding
+/// that it avoids.
+fn add_number(mean: f32, carry: i16, value: f32, weight: f64) -> (f32, i16) {
+    let old = f64::from(mean) + f64::from(carry) * ulp(mean) / CARRY;
+    let new = old + (f64::from(value) - old) * weight;
+    let mean = new as f32;
+    let step = ulp(mean);
+    let rest = if step > 0.0 { (new - f64::from(mean)) / step * CARRY } else { 0.0 };
+    (mean, rest.round() as i16)
+}
+
+/// A finite number of any size, often a small whole one: ties of roundings are rare among others.
+fn any_number() -> impl Strategy<Value = f32> {
+    let of_bits = any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |x| x.is_finite());
+    prop_oneof![of_bits, (-9i16..9).prop_map(f32::from), 1e-3f32..10.0]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// With whatever instructions this processor has, and whatever the length of the row.
+    #[test]
+    fn rows_are_added_as_single_numbers_are(
+        row in prop::collection::vec((any_number(), any::<i16>(), any_number()), 1..40),
+        spp in 1u64..200,
+        before in 0u64..2000,
+    ) {
+        let (mut mean, mut carry): (Vec<f32>, Vec<i16>) = row.iter().map(|n| (n.0, n.1)).unzip();
+        let values: Vec<f32> = row.iter().map(|n| n.2).collect();
+        let weight = weight(spp, before);
+        let expected: Vec<(f32, i16)> = row.iter().map(|&(m, c, v)| add_number(m, c, v, weight)).collect();
+        add_numbers(&mut mean, &mut carry, &values, weight);
+        let found = mean.into_iter().zip(carry);
+        for (found, expected) in found.zip(expected) {
+            prop_assert_eq!((found.0.to_bits(), found.1), (expected.0.to_bits(), expected.1));
+        }
+    }
 }

@@ -239,3 +239,61 @@ impl MapSamples for Vec<(u64, StopReason)> {
         self.iter().map(|s| s.0).collect()
     }
 }
+
+/// An image pushed as a whole, with any number of threads, is its tiles pushed one by one: film, counts of what was
+/// left out, and all that was noticed.
+#[test]
+fn images_are_tiles_one_by_one_whatever_the_threads() {
+    let (width, height) = (150, 83);
+    let image = |k: u64| -> Vec<Rgb> {
+        let mut noise = noisefloor_testkit::Noise::keyed(&[63, k]);
+        let mut number = || (0.3 + 0.4 * noise.normal()) as f32;
+        let mut image: Vec<Rgb> = (0..width * height).map(|_| [number(), number(), number()]).collect();
+        // Lost now in one half, now in the other
+        (0..40).for_each(|i| image[(i * 311 + 97 * k as usize) % (width * height)][1] = f32::INFINITY);
+        image
+    };
+    let new = || {
+        let params = Params::default().with_tile(32).with_max_spp(1000);
+        let mut session = Session::new(width, height, crate::Oracle::bundled(), params).unwrap();
+        for tile in [0, 3, 7] {
+            session.close(tile, Interruption::Cancelled);
+        }
+        session
+    };
+    let saved = |session: &Session<crate::Oracle>| {
+        let mut bytes = Vec::new();
+        session.checkpoint("job").unwrap().write(&mut bytes).unwrap();
+        (bytes, session.film().rejected(), session.negative_samples())
+    };
+    let batches = || (0..9).map(|k| ([8, 8, 5, 16, 40][k % 5], image(k as u64)));
+    let mut one_by_one = new();
+    for (spp, image) in batches() {
+        for tile in one_by_one.film().grid().tiles().filter(|tile| ![0, 3, 7].contains(&tile.index)) {
+            let mean: Vec<Rgb> = tile.rows(width).flat_map(|row| image[row].to_vec()).collect();
+            one_by_one.push(tile.index, spp, &mean).unwrap();
+        }
+    }
+    assert!(one_by_one.film().rejected() > 0 && one_by_one.negative_samples() > 0);
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut whole = new();
+        batches().for_each(|(spp, image)| pool.install(|| whole.push_image(spp, &image)).unwrap());
+        assert!(saved(&whole) == saved(&one_by_one), "{threads} threads");
+    }
+}
+
+/// Tiles before the one that is refused have the samples, as if they had been pushed one by one.
+#[test]
+fn an_image_is_pushed_up_to_the_tile_that_is_refused() {
+    let mut session = Session::new(64, 32, crate::FixedSpp(100), Params::default().with_tile(16)).unwrap();
+    let mut image = vec![[0.5; 3]; 64 * 32];
+    let tile = session.film().grid().tile(5);
+    tile.rows(64).for_each(|row| image[row].fill([f32::NAN; 3]));
+    let fault = session.push_image(8, &image).unwrap_err();
+    assert!(matches!(fault, SessionError::Fault(Fault::Light { tile: 5, .. })), "{fault}");
+    let spp: Vec<u64> = (0..8).map(|tile| session.film().spp(tile)).collect();
+    assert_eq!(spp, [8, 8, 8, 8, 8, 0, 0, 0]);
+    let none = session.push_image(0, &vec![[0.5; 3]; 64 * 32]).unwrap_err();
+    assert!(matches!(none, SessionError::Film(FilmError::NothingNew { tile: 0, .. })), "{none}");
+}

@@ -4,6 +4,7 @@ use super::points::level;
 use crate::display::luminance;
 use crate::film::Film;
 use crate::tile::{Tile, TileGrid};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -175,7 +176,8 @@ impl Sides {
                 [column(0), column(right.min(1))],
             ]
         };
-        let mut all: Vec<[[Vec<f64>; 2]; 4]> = film.grid().tiles().map(sides).collect();
+        let tiles: Vec<Tile> = film.grid().tiles().collect();
+        let mut all: Vec<[[Vec<f64>; 2]; 4]> = tiles.into_par_iter().map(sides).collect();
         let typical = level(&all.as_flattened().as_flattened().concat());
         let lines = all.as_flattened_mut().as_flattened_mut();
         lines.iter_mut().flatten().for_each(|v| *v = v.max(0.0) / (typical + v.max(0.0)));

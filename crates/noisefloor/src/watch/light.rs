@@ -62,15 +62,13 @@ impl LightCheck {
 
     /// Whether most pixels are finite, and the light of those on average not less than none.
     pub(super) fn check_all(&mut self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
-        let (mut sum, mut finite, mut all) = (0.0, 0usize, 0usize);
-        for pixel in pixels {
-            all += 1;
-            if is_finite(&pixel) {
-                let light = f64::from(luminance(pixel));
-                (sum, finite) = (sum + light, finite + 1);
-                self.brightest = self.brightest.max(light);
-            }
-        }
+        self.check_seen(SeenLight::of(pixels))
+    }
+
+    /// The same of pixels that were looked at.
+    pub(super) fn check_seen(&mut self, seen: SeenLight) -> Result<(), ImpossibleLight> {
+        let SeenLight { sum, finite, all, brightest } = seen;
+        self.brightest = self.brightest.max(brightest);
         let lost = (all - finite) as f64 / all.max(1) as f64;
         if lost > MOST_NON_FINITE {
             return Err(ImpossibleLight::NotFinite { percent: 100.0 * lost });
@@ -80,6 +78,30 @@ impl LightCheck {
             return Err(ImpossibleLight::Negative { mean });
         }
         Ok(())
+    }
+}
+
+/// What there is to see in pixels of a tile, apart from all others: luminance, where it is finite.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct SeenLight {
+    sum: f64,
+    finite: usize,
+    all: usize,
+    brightest: f64,
+}
+
+impl SeenLight {
+    pub(super) fn of(pixels: impl Iterator<Item = Rgb>) -> Self {
+        let mut seen = Self::default();
+        for pixel in pixels {
+            seen.all += 1;
+            if is_finite(&pixel) {
+                let light = f64::from(luminance(pixel));
+                (seen.sum, seen.finite) = (seen.sum + light, seen.finite + 1);
+                seen.brightest = seen.brightest.max(light);
+            }
+        }
+        seen
     }
 }
 

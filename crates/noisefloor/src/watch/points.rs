@@ -1,8 +1,7 @@
 //! The pixels that are watched.
 
 use crate::display::luminance;
-use crate::rgb::Rgb;
-use crate::tile::{Tile, TileGrid};
+use crate::tile::{Tile, TileGrid, TilePixels};
 
 /// Pixels of a picture up to which one pixel in 4×4 is watched.
 const SMALL: usize = 160 * 160;
@@ -18,29 +17,30 @@ impl Points {
         Self { step: if grid.width() * grid.height() <= SMALL { 4 } else { 8 } }
     }
 
-    /// Places in a batch of this tile, row-major; each has a neighbour to the left and to the right. None of
-    /// a tile that is narrower than three pixels.
-    pub(super) fn of(self, tile: Tile) -> impl Iterator<Item = usize> + Clone {
+    /// Places (x, y) within this tile, row-major; each has a neighbour to the left and to the right. None of a
+    /// tile that is narrower than three pixels.
+    pub(super) fn of(self, tile: Tile) -> impl Iterator<Item = (usize, usize)> + Clone {
         Self::every(self.step, tile)
     }
 
     /// As [`Points::of`], four times as many: for the first batches, by which a tile could stop soon.
-    pub(super) fn at_first(self, tile: Tile) -> impl Iterator<Item = usize> + Clone {
+    pub(super) fn at_first(self, tile: Tile) -> impl Iterator<Item = (usize, usize)> + Clone {
         Self::every(self.step / 2, tile)
     }
 
-    fn every(step: usize, tile: Tile) -> impl Iterator<Item = usize> + Clone {
+    fn every(step: usize, tile: Tile) -> impl Iterator<Item = (usize, usize)> + Clone {
         let middle = step / 2 - 1;
         let columns = (middle.max(1)..tile.width.saturating_sub(1)).step_by(step);
         let rows = (middle.min(tile.height - 1)..tile.height).step_by(step);
-        rows.flat_map(move |y| columns.clone().map(move |x| y * tile.width + x))
+        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
     }
 }
 
 /// Luminance of a pixel's left neighbour, of itself, and of its right neighbour.
 #[inline]
-pub(super) fn light(mean: &[Rgb], pixel: usize) -> [f32; 3] {
-    [mean[pixel - 1], mean[pixel], mean[pixel + 1]].map(luminance)
+pub(super) fn light(mean: TilePixels<'_>, (x, y): (usize, usize)) -> [f32; 3] {
+    let row = mean.row(y);
+    [row[x - 1], row[x], row[x + 1]].map(luminance)
 }
 
 /// A typical one of these values: the geometric mean of those above 0, which a few lamps and fireflies hardly

@@ -4,8 +4,7 @@ use super::CERTAIN;
 use super::points::level;
 use crate::display::luminance;
 use crate::film::Film;
-use crate::rgb::Rgb;
-use crate::tile::Tile;
+use crate::tile::{Tile, TilePixels};
 use serde::{Deserialize, Serialize};
 
 /// How many times as many samples as the batches before a batch has, on average, to be compared with them.
@@ -32,13 +31,13 @@ pub(crate) struct Shift {
 
 impl Shift {
     /// Of a batch before it is added; of its tile, the film has the mean of so many batches.
-    pub(super) fn of(film: &Film, tile: Tile, batches: u64, spp: u64, mean: &[Rgb]) -> Option<Self> {
+    pub(super) fn of(film: &Film, tile: Tile, batches: u64, spp: u64, mean: TilePixels<'_>) -> Option<Self> {
         let (had, new) = (film.spp(tile.index) as f64, spp as f64);
         if batches == 0 || new * (batches as f64) < LARGER * had || new > had {
             return None;
         }
         let share = new / (had + new);
-        let pixels = tile.rows(film.grid().width()).flatten().zip(mean).map(|(pixel, &batch)| {
+        let pixels = tile.rows(film.grid().width()).flatten().zip(mean.iter()).map(|(pixel, batch)| {
             let (before, batch) =
                 (f64::from(luminance(film.pixel(tile.index, pixel))), f64::from(luminance(batch)));
             let difference = batch - before;
