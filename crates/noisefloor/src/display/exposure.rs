@@ -38,6 +38,12 @@ const BENT: f64 = 0.5;
 /// Logarithm by which a pixel may be off whose light is not known.
 const UNKNOWN: f64 = 1.0;
 
+/// Blocks of each grid that are looked at first, of a picture that has more.
+const LOOKED_AT: usize = 2048;
+/// Standard error of the logarithm, by looking at so few, from which four times as many are looked at: half of what
+/// sessions let it have in all. A checkerboard whose squares are as large as blocks has it, and few pictures.
+const SAMPLED: f64 = 0.0075;
+
 /// Where blocks of four grids begin: what a block has of both sides of an edge is then not left to chance.
 const GRIDS: [(usize, usize); 4] = [(0, 0), (21, 9), (42, 51), (11, 33)];
 
@@ -89,20 +95,25 @@ impl Pool {
 
     /// What is left of up to four blocks. Black pixels join if light like that of the others may have
     /// missed them, and if so many blocks are lit.
-    fn of(blocks: impl Iterator<Item = Self> + Clone, least: usize) -> Self {
-        let mut all = blocks.clone().fold(Self::default(), |all, one| Self {
-            lit: all.lit + one.lit,
-            sum: all.sum + one.sum,
-            variance: all.variance + one.variance,
-            expected: all.expected + one.expected,
-            black: 0.0,
-            known: all.known + one.known,
-            logs: all.logs + one.logs,
-        });
+    #[inline]
+    fn of<'a>(blocks: impl Iterator<Item = &'a Self> + Clone, least: usize) -> Self {
+        let (mut all, mut lit_blocks, mut any_black) = (Self::default(), 0, false);
+        for one in blocks.clone() {
+            all.lit += one.lit;
+            all.sum += one.sum;
+            all.variance += one.variance;
+            all.expected += one.expected;
+            all.known += one.known;
+            all.logs += one.logs;
+            lit_blocks += usize::from(one.lit > 0.0);
+            any_black |= one.black > 0.0;
+        }
+        if !any_black {
+            return all;
+        }
         let (lit, met) = (all.lit, certainty(all.sum, all.variance));
-        let among_light = blocks.clone().filter(|block| block.lit > 0.0).count() >= least;
-        for Self { black, .. } in blocks.filter(|block| block.black > 0.0) {
-            if among_light && black <= lit && black * met < MISSED * lit {
+        for &Self { black, .. } in blocks.filter(|block| block.black > 0.0) {
+            if lit_blocks >= least && black <= lit && black * met < MISSED * lit {
                 all.lit += black;
             } else {
                 all.black += black;
@@ -113,12 +124,16 @@ impl Pool {
 
     /// Counts the pixels if their mean is known: by its own variance, and by that of the pixels around
     /// it, which grows with the light or with its square.
+    #[inline]
     fn count(&mut self, noise: Noise, tally: &mut Tally) {
+        if self.lit == 0.0 {
+            return;
+        }
         // Light of another order beside a pixel says nothing of it; rare light that it has not met does
         let by_light = self.sum * noise.of_light;
         let around = if by_light > FAR * self.expected { self.expected } else { by_light };
         let variance = self.variance.max(around);
-        if !(self.lit > 0.0 && self.sum > 0.0 && certainty(self.sum, variance) >= tally.enough) {
+        if !(self.sum > 0.0 && certainty(self.sum, variance) >= tally.enough) {
             return;
         }
         // E ln X ≈ ln E X − Var X/(2·(E X)²)
@@ -184,7 +199,9 @@ impl Tally {
     }
 
     fn add(&mut self, pixels: f64, log: f64, relative: f64) {
-        let bin = (log.floor() as i32 + BINS / 2).clamp(0, BINS - 1);
+        // The floor, without the call that `floor` is
+        let whole = log as i32;
+        let bin = (whole - i32::from(f64::from(whole) > log) + BINS / 2).clamp(0, BINS - 1);
         let [count, sum] = &mut self.bins[bin as usize];
         *count += pixels;
         *sum += pixels * log;
@@ -217,21 +234,45 @@ impl Tally {
 /// The log-average of the converged picture, from one of `width`×`height` pixels; `None` if all is black.
 /// `pixel(x, y)` is `None` where there is no sample.
 pub(crate) fn estimate(
-    (width, height): (usize, usize),
+    size: (usize, usize),
     pixel: impl Fn(usize, usize) -> Option<NoisyPixel> + Sync,
 ) -> Option<LogAverage> {
-    let row = |y: usize| (0..width).map(|x| pixel(x, y).filter(|p| p.luminance.is_finite())).collect();
-    let rows: Vec<Vec<Option<NoisyPixel>>> = (0..height).into_par_iter().map(row).collect();
-    let on_grids = |enough| -> Vec<LogAverage> {
-        GRIDS.iter().filter_map(|&grid| on_grid(width, &rows, grid, enough)).collect()
-    };
-    let (found, coarse) = (on_grids(ENOUGH), on_grids(2.0 * ENOUGH));
+    let pixel = |x: usize, y: usize| pixel(x, y).filter(|p| p.luminance.is_finite());
+    let mut most = LOOKED_AT;
+    loop {
+        match by_blocks(size, most, &pixel) {
+            Some((found, sampled)) if sampled <= SAMPLED => return Some(found),
+            None if Lattice::is_whole(size, most) => return None,
+            _ => most *= 4,
+        }
+    }
+}
+
+/// The same by so many blocks of each grid at most, and the standard error of its logarithm by these being a sample.
+fn by_blocks(
+    size: (usize, usize),
+    most: usize,
+    pixel: &(impl Fn(usize, usize) -> Option<NoisyPixel> + Sync),
+) -> Option<(LogAverage, f64)> {
+    let grids: Vec<[Option<LogAverage>; 2]> =
+        (0..GRIDS.len()).map(|grid| on_grid(&Lattice::new(size, grid, most), pixel)).collect();
+    let [found, coarse] = [0, 1].map(|i| grids.iter().filter_map(|of| of[i]).collect::<Vec<LogAverage>>());
     let mean = mean_log(&found)?;
     let count = found.len() as f64;
-    let scatter = found.iter().map(|one| (one.value.ln() - mean).powi(2)).sum::<f64>() / count;
+    let scatter = found.iter().map(|one| (one.value.ln() - mean).powi(2)).sum::<f64>();
+    // Grids that look at all differ by where blocks begin; others are a sample
+    let whole = Lattice::is_whole(size, most);
+    let scatter = scatter / if whole { count } else { (count - 1.0).max(1.0) };
     let error = found.iter().map(|one| one.error * one.error).sum::<f64>() / count;
     let bent = BENT * (mean_log(&coarse)? - mean);
-    Some(LogAverage { value: mean.exp(), error: (error + scatter / count + bent * bent).sqrt() })
+    let error = (error + scatter / count + bent * bent).sqrt();
+    let sampled = match found.len() {
+        _ if whole => 0.0,
+        // A sample that met no light
+        met if met < GRIDS.len() => f64::INFINITY,
+        _ => (scatter / count).sqrt(),
+    };
+    Some((LogAverage { value: mean.exp(), error }, sampled))
 }
 
 fn mean_log(found: &[LogAverage]) -> Option<f64> {
@@ -239,32 +280,107 @@ fn mean_log(found: &[LogAverage]) -> Option<f64> {
     (!found.is_empty()).then(|| sum / found.len() as f64)
 }
 
-/// The same by blocks that begin at (`dx`, `dy`).
-fn on_grid(
-    width: usize,
-    rows: &[Vec<Option<NoisyPixel>>],
-    (dx, dy): (usize, usize),
-    enough: f64,
-) -> Option<LogAverage> {
-    let (mut across, mut down) = ((width + dx).div_ceil(BLOCK), (rows.len() + dy).div_ceil(BLOCK));
-    let row_of_blocks = |top: usize| {
-        let mut tally = Tally::new(enough);
-        let block = |left: usize| {
-            let at = |x: usize, y: usize| *rows.get(y.checked_sub(dy)?)?.get(x.checked_sub(dx)?)?;
-            let pixels =
-                std::array::from_fn(|y| std::array::from_fn(|x| at(left * BLOCK + x, top * BLOCK + y)));
-            pool_block(&pixels, &mut tally)
-        };
-        let pools: Vec<Pool> = (0..across).map(block).collect();
-        (pools, tally)
-    };
-    let parts: Vec<(Vec<Pool>, Tally)> = (0..down).into_par_iter().map(row_of_blocks).collect();
-    // In their order, so that the sums are the same with any number of threads
-    let (mut pools, mut tally) = (Vec::with_capacity(across * down), Tally::new(enough));
-    for (part, counted) in parts {
-        pools.extend(part);
-        tally.merge(&counted);
+/// The blocks of a grid that are looked at.
+///
+/// Of a large picture, not all: what half a million pixels say is known well enough, as a rule, and a look at all
+/// takes longer than a verdict. The places where a block may begin, up to seven pixels before the picture, are divided
+/// into as many cells, and a block begins anywhere in its cell: each pixel is as likely to be met, and nothing regular
+/// in the picture is met or missed regularly. What grids that look at other blocks differ by is in the error.
+struct Lattice {
+    size: (usize, usize),
+    grid: usize,
+    /// Blocks, or cells of one block each, across and down.
+    cells: (usize, usize),
+    whole: bool,
+}
+
+impl Lattice {
+    /// With so many blocks of all pixels at most.
+    fn new((width, height): (usize, usize), grid: usize, most: usize) -> Self {
+        let (dx, dy) = GRIDS[grid];
+        let (across, down) = ((width + dx).div_ceil(BLOCK), (height + dy).div_ceil(BLOCK));
+        let whole = Self::is_whole((width, height), most);
+        let share = (most as f64 * (BLOCK * BLOCK) as f64 / (width as f64 * height as f64)).sqrt();
+        let cells = |edge: usize| (((edge / BLOCK) as f64 * share) as usize).max(1);
+        let cells = if whole { (across, down) } else { (cells(width), cells(height)) };
+        Self { size: (width, height), grid, cells, whole }
     }
+
+    /// Whether all of a picture of this size is looked at.
+    fn is_whole((width, height): (usize, usize), most: usize) -> bool {
+        width * height <= most * BLOCK * BLOCK
+    }
+
+    /// Where a block begins, which may be before the picture.
+    fn block(&self, column: usize, row: usize) -> [isize; 2] {
+        let (dx, dy) = GRIDS[self.grid];
+        if self.whole {
+            return [(column, dx), (row, dy)].map(|(at, before)| (at * BLOCK) as isize - before as isize);
+        }
+        let somewhere = scattered((row * self.cells.0 + column) * GRIDS.len() + self.grid);
+        let place = |cell: usize, cells: usize, edge: usize, somewhere: u64| {
+            let [from, to] = [cell, cell + 1].map(|cell| cell * (edge + BLOCK - 1) / cells);
+            (from + somewhere as usize % (to - from)) as isize - (BLOCK - 1) as isize
+        };
+        let x = place(column, self.cells.0, self.size.0, somewhere & 0xffff_ffff);
+        let y = place(row, self.cells.1, self.size.1, somewhere >> 32);
+        [x, y]
+    }
+}
+
+/// A number without order: the last step of splitmix64 (Steele, Lea and Flood 2014).
+fn scattered(number: usize) -> u64 {
+    let mut z = (number as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// The same by the blocks of one grid: with [`ENOUGH`], and with twice as much.
+fn on_grid(
+    lattice: &Lattice,
+    pixel: &(impl Fn(usize, usize) -> Option<NoisyPixel> + Sync),
+) -> [Option<LogAverage>; 2] {
+    let (width, height) = lattice.size;
+    let row_of_cells = |row: usize| {
+        let mut tallies = [ENOUGH, 2.0 * ENOUGH].map(Tally::new);
+        let block = |column: usize| {
+            let [left, top] = lattice.block(column, row);
+            let mut pixels = [[None; BLOCK]; BLOCK];
+            for (y, row) in pixels.iter_mut().enumerate() {
+                let Some(y) = top.checked_add_unsigned(y).and_then(|y| usize::try_from(y).ok()) else {
+                    continue;
+                };
+                for (x, place) in row.iter_mut().enumerate() {
+                    let Some(x) = left.checked_add_unsigned(x).and_then(|x| usize::try_from(x).ok()) else {
+                        continue;
+                    };
+                    if x < width && y < height {
+                        *place = pixel(x, y);
+                    }
+                }
+            }
+            pool_block(&pixels, &mut tallies)
+        };
+        let pools: Vec<[Pool; 2]> = (0..lattice.cells.0).map(block).collect();
+        (pools, tallies)
+    };
+    let parts: Vec<_> = (0..lattice.cells.1).into_par_iter().map(row_of_cells).collect();
+    [0, 1].map(|i| {
+        // In their order, so that the sums are the same with any number of threads
+        let mut tally = Tally::new(parts[0].1[i].enough);
+        parts.iter().for_each(|(_, tallies)| tally.merge(&tallies[i]));
+        let pools = parts.iter().flat_map(|(pools, _)| pools.iter().map(|pools| pools[i])).collect();
+        over_all(pools, lattice.cells, tally)
+    })
+}
+
+/// Pools blocks up to one of the whole picture.
+fn over_all(
+    mut pools: Vec<Pool>,
+    (mut across, mut down): (usize, usize),
+    mut tally: Tally,
+) -> Option<LogAverage> {
     while pools.len() > 1 {
         pools = halved(&pools, (across, down), &mut tally);
         (across, down) = (across.div_ceil(2), down.div_ceil(2));
@@ -285,9 +401,8 @@ fn halved(pools: &[Pool], (columns, rows): (usize, usize), tally: &mut Tally) ->
     for y in (0..rows).step_by(2) {
         for x in (0..columns).step_by(2) {
             let inside = |&(x, y): &(usize, usize)| x < columns && y < rows;
-            let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
-            let four = four.into_iter().filter(inside).map(|(x, y)| pools[y * columns + x]);
-            let mut pool = Pool::of(four, LIT_BESIDE);
+            let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].into_iter().filter(inside);
+            let mut pool = Pool::of(four.map(|(x, y)| &pools[y * columns + x]), LIT_BESIDE);
             pool.count(Noise::default(), tally);
             larger.push(pool);
         }
@@ -297,36 +412,41 @@ fn halved(pools: &[Pool], (columns, rows): (usize, usize), tally: &mut Tally) ->
 
 type Block<T> = [[Option<T>; BLOCK]; BLOCK];
 
-/// Counts what is known of a block pixel by pixel, and in blocks of 2×2, 4×4 and 8×8.
-fn pool_block(pixels: &Block<NoisyPixel>, tally: &mut Tally) -> Pool {
-    let pixels = with_variances(pixels);
+/// Counts what is known of a block pixel by pixel, and in blocks of 2×2, 4×4 and 8×8, for either tally.
+fn pool_block(pixels: &Block<NoisyPixel>, tallies: &mut [Tally; 2]) -> [Pool; 2] {
+    let pixels = &with_variances(pixels);
     let around = |x: usize, y: usize| {
         let rows = pixels[y..y + AROUND].iter();
         Noise::of(rows.flat_map(|row| row[x..x + AROUND].iter().copied().flatten()))
     };
     let noise = [0, AROUND].map(|y| [0, AROUND].map(|x| around(x, y)));
-    let mut pools = [Pool::default(); BLOCK * BLOCK];
-    for (at, pool) in pools.iter_mut().enumerate() {
-        let (x, y) = (at % BLOCK, at / BLOCK);
-        let noise = noise[y / AROUND][x / AROUND];
-        *pool = pixels[y][x].map_or_else(Pool::default, |pixel| Pool::pixel(pixel, noise));
-        pool.count(noise, tally);
-    }
-    let mut edge = BLOCK;
-    while edge > 1 {
-        let half = edge / 2;
-        for at in 0..half * half {
-            let (x, y) = (at % half * 2, at / half * 2);
-            // Never before what is still to be read
-            let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| pools[y * edge + x]);
-            pools[at] = Pool::of(four.into_iter(), 1);
-            // From 4×4 on, a block has differences enough of its own
-            let noise = if half == AROUND { noise[y / AROUND][x / AROUND] } else { Noise::default() };
-            pools[at].count(noise, tally);
+    tallies.each_mut().map(|tally| {
+        let mut pools = [Pool::default(); BLOCK * BLOCK];
+        for (at, pool) in pools.iter_mut().enumerate() {
+            let (x, y) = (at % BLOCK, at / BLOCK);
+            let noise = noise[y / AROUND][x / AROUND];
+            if let Some(pixel) = pixels[y][x] {
+                *pool = Pool::pixel(pixel, noise);
+                pool.count(noise, tally);
+            }
         }
-        edge = half;
-    }
-    pools[0]
+        let mut edge = BLOCK;
+        while edge > 1 {
+            let half = edge / 2;
+            for at in 0..half * half {
+                let (x, y) = (at % half * 2, at / half * 2);
+                // Never before what is still to be read
+                let first = y * edge + x;
+                let four = [first, first + 1, first + edge, first + edge + 1];
+                pools[at] = Pool::of(four.iter().map(|&at| &pools[at]), 1);
+                // From 4×4 on, a block has differences enough of its own
+                let noise = if half == AROUND { noise[y / AROUND][x / AROUND] } else { Noise::default() };
+                pools[at].count(noise, tally);
+            }
+            edge = half;
+        }
+        pools[0]
+    })
 }
 
 /// Luminance and its variance. Where that is not given, it is the sample variance of 2×2 pixels: where
@@ -341,15 +461,15 @@ fn with_variances(pixels: &Block<NoisyPixel>) -> Block<[f64; 2]> {
         let mean = there().sum::<f64>() / count;
         there().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)
     };
-    std::array::from_fn(|y| {
-        std::array::from_fn(|x| {
-            pixels[y][x].map(|NoisyPixel { luminance, deviation }| {
-                let variance =
-                    deviation.map_or_else(|| beside(x, y), |deviation| f64::from(deviation).powi(2));
-                [f64::from(luminance), variance]
-            })
-        })
-    })
+    let mut all = [[None; BLOCK]; BLOCK];
+    for (y, (row, pixels)) in all.iter_mut().zip(pixels).enumerate() {
+        for (x, (place, pixel)) in row.iter_mut().zip(pixels).enumerate() {
+            let Some(NoisyPixel { luminance, deviation }) = *pixel else { continue };
+            let variance = deviation.map_or_else(|| beside(x, y), |deviation| f64::from(deviation).powi(2));
+            *place = Some([f64::from(luminance), variance]);
+        }
+    }
+    all
 }
 
 /// Two renderings of one picture, of so many samples per pixel each, at one pixel: their mean and its

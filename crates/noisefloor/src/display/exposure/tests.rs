@@ -242,3 +242,87 @@ fn batch(truth: &[f64], tile: Tile, spp: u64, half: u64) -> Vec<Rgb> {
     };
     tile.rows(SIZE.0).flatten().map(|pixel| met(truth[pixel])).collect()
 }
+
+/// Of a large picture, a sample of blocks is looked at: what is found lies within what it says of itself, and grids
+/// and cells miss nothing regular.
+#[test]
+fn a_sample_of_a_large_picture_is_enough() {
+    let size = (1230, 570);
+    let regular = |x: usize, y: usize| if (x / 16 + y / 16) % 2 == 0 { 1.0 } else { 0.05 };
+    let stripes = |x: usize, _: usize| if x % 24 < 8 { 1.0 } else { 0.01 };
+    let slow = |x: usize, y: usize| ((x as f64 / 200.0).sin() * 2.0 + (y as f64 / 90.0).cos()).exp();
+    let small = |x: usize, y: usize| if (x / 40 % 7, y / 40 % 5) == (3, 2) { 50.0 } else { 0.2 };
+    let pictures: [&dyn Fn(usize, usize) -> f64; 4] = [&regular, &stripes, &slow, &small];
+    for (kind, light) in pictures.into_iter().enumerate() {
+        assert!(!Lattice::is_whole(size, LOOKED_AT));
+        let mut noise = Noise::keyed(&[63, kind as u64]);
+        let truth: Vec<f64> = (0..size.0 * size.1).map(|i| light(i % size.0, i / size.0)).collect();
+        let mut half =
+            || -> Vec<f64> { truth.iter().map(|light| light * (1.0 + 0.02 * noise.normal())).collect() };
+        let halves = [half(), half()];
+        let pixel =
+            |x: usize, y: usize| of_halves([0, 1].map(|i| ([halves[i][y * size.0 + x] as f32; 3], 8.0)));
+        let found = estimate(size, pixel).unwrap();
+        let off = off(found, &truth);
+        // Four standard errors, by four grids: as Student's t of three degrees of freedom, 3 in 100 for one picture
+        assert!(off.abs() < 4.0 * found.error + 1e-3 && found.error < 0.015, "{kind}: {off} off, {found:?}");
+    }
+}
+
+/// Light in a corner of a black picture is found, however small a sample misses it.
+#[test]
+fn a_lamp_that_a_sample_misses_is_found() {
+    let size = (1230, 570);
+    for edge in [1, 3, 12, 40] {
+        let lit = |x: usize, y: usize| (700..700 + edge).contains(&x) && (300..300 + edge).contains(&y);
+        let pixel = |x: usize, y: usize| of_halves([([if lit(x, y) { 3.0 } else { 0.0 }; 3], 8.0); 2]);
+        let found = estimate(size, pixel).unwrap();
+        assert!((found.value / 3.0 - 1.0).abs() < 1e-3 && found.error < 1e-6, "{edge}: {found:?}");
+    }
+    assert!(estimate(size, |_, _| of_halves([([0.0; 3], 8.0); 2])).is_none());
+}
+
+/// Blocks begin in their cells, and no pixel is met more often than others, but for chance.
+#[test]
+fn blocks_are_all_over_a_large_picture() {
+    for size in [(363, 362), (1920, 1080), (65_536, 3), (5, 60_000), (4000, 131)] {
+        let mut met = vec![0u32; size.0 * size.1];
+        for grid in 0..GRIDS.len() {
+            let lattice = Lattice::new(size, grid, LOOKED_AT);
+            let (across, down) = lattice.cells;
+            assert!(!lattice.whole);
+            for (row, column) in (0..down).flat_map(|row| (0..across).map(move |column| (row, column))) {
+                let [x, y] = lattice.block(column, row);
+                for (at, cell, cells, edge) in [(x, column, across, size.0), (y, row, down, size.1)] {
+                    let [from, to] = [cell, cell + 1].map(|cell| (cell * (edge + 7) / cells) as isize - 7);
+                    assert!(from <= at && at < to, "{size:?}: {at} in {from}..{to}");
+                }
+                for pixel in 0..BLOCK * BLOCK {
+                    let at = [x + (pixel % BLOCK) as isize, y + (pixel / BLOCK) as isize];
+                    let [x, y] = at.map(|at| usize::try_from(at).unwrap_or(usize::MAX));
+                    if x < size.0 && y < size.1 {
+                        met[y * size.0 + x] += 1;
+                    }
+                }
+            }
+        }
+        // As many pixels as there may be, but for rounding, or a quarter of them where blocks are cut off
+        let all: u32 = met.iter().sum();
+        let most = (GRIDS.len() * LOOKED_AT * BLOCK * BLOCK) as u32;
+        assert!((most / 4..=most + most / 16).contains(&all), "{size:?}: {all} of {most}");
+        // Quarters of the picture are met alike: some thousand blocks each, at 4 standard errors of fewer than 1 in 30
+        let quarter = |i: usize| (i % size.0 * 2 / size.0) + 2 * (i / size.0 * 2 / size.1);
+        let mut sums = [0u32; 4];
+        let mut pixels = [0usize; 4];
+        for (i, met) in met.iter().enumerate() {
+            sums[quarter(i)] += met;
+            pixels[quarter(i)] += 1;
+        }
+        let share = |i: usize| f64::from(sums[i]) / pixels[i].max(1) as f64;
+        let mean = f64::from(all) / met.len() as f64;
+        let there = (0..4).filter(|&i| pixels[i] > 0);
+        there.for_each(|i| {
+            assert!((share(i) / mean - 1.0).abs() < 0.12, "{size:?}: {i} {} of {mean}", share(i))
+        });
+    }
+}
