@@ -6,6 +6,7 @@
 //!
 //! - A renderer that owns its loop pushes samples into a [`Session`].
 //! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
+//! - A GPU hands over its passes to a [`Background`](background::Background), and goes on.
 //! - A [`Checkpoint`] is a snapshot of either, for resuming it in another process.
 //! - [`Oracle`] is the [`StoppingCriterion`] that judges by a trained [`Model`]; [`FixedSpp`] is the simplest
 //!   one.
@@ -32,6 +33,7 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
+pub mod background;
 pub mod checkpoint;
 mod container;
 pub mod criterion;

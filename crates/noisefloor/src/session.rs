@@ -60,6 +60,9 @@ pub enum SessionError {
     /// Samples that cannot be what they are said to be.
     #[error(transparent)]
     Fault(#[from] Fault),
+    /// A [`Background`](crate::background::Background) without a thread, or whose criterion panicked.
+    #[error("judging in the background failed: {0}")]
+    Background(String),
 }
 
 impl fmt::Debug for SessionError {
@@ -247,6 +250,13 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles.iter().enumerate().filter_map(wish).collect()
     }
 
+    /// Samples per pixel that the next pass over the whole image should have, for a renderer of whole frames: what
+    /// one half lacks until the first of the open tiles can be judged, so that nothing has to be read back from a GPU
+    /// before. `None` when all tiles are done.
+    pub fn next_pass(&self) -> Option<u64> {
+        self.requests().iter().map(|request| request.spp).min()
+    }
+
     /// Adds the mean of `spp` new samples per pixel of a tile, row-major over the tile. Finished tiles accept
     /// samples, too: they improve, and keep their stop.
     ///
@@ -277,7 +287,7 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Adds new samples of tiles, in the order of the grid: those before the one that is refused. All that tiles
     /// need not wait for each other with is distributed over threads, to the same bits.
-    fn push_tiles<'a>(
+    pub(crate) fn push_tiles<'a>(
         &mut self,
         spp: u64,
         tiles: &[Tile],
@@ -299,6 +309,18 @@ impl<C: StoppingCriterion> Session<C> {
         film.add_tiles(spp, accepted, &pixels);
         watch.see(compared, spp, pixels);
         refused
+    }
+
+    /// Adds samples that came after their tile had stopped: they are not watched.
+    pub(crate) fn add_late(&mut self, late: &Film) -> Result<(), FilmError> {
+        let grid = self.film.grid();
+        for tile in grid.tiles().filter(|tile| late.spp(tile.index) > 0) {
+            let valid = |pixel| late.pixel_counts(tile.index, pixel)[0] > 0;
+            let mean = |pixel| if valid(pixel) { late.pixel(tile.index, pixel) } else { [f32::NAN; 3] };
+            let mean: Vec<Rgb> = tile.rows(grid.width()).flatten().map(mean).collect();
+            self.film.add(tile.index, late.spp(tile.index), &mean)?;
+        }
+        Ok(())
     }
 
     /// Adds the new samples in a running mean of a tile; see [`Film::add_running`].

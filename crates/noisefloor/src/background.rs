@@ -1,0 +1,474 @@
+//! A session that judges beside the rendering.
+//!
+//! A renderer on a GPU is done with a pass before a verdict is. [`Background`] takes the pass, and the renderer goes
+//! on: one thread pushes and judges what was handed over, in that order, by an ordinary [`Session`]. Stops, warnings
+//! and faults are those of that session, to the bit, and come when they come ([`Background::news`]). Samples that a
+//! tile gets after it stopped, since nobody could know yet, are kept aside, so that they change no verdict, and count
+//! in the picture at the end.
+//!
+//! ```
+//! use noisefloor::background::{Background, WhenFull};
+//! use noisefloor::{Oracle, Params, Schedule, Session};
+//!
+//! let params = Params::default().with_tile(32).with_schedule(Schedule::Growing { step: 16 });
+//! let session = Session::new(64, 64, Oracle::bundled(), params)?;
+//! let background = Background::new(session, 2, WhenFull::Wait)?;
+//! while let Some(spp) = background.next_pass() {
+//!     let mut image = background.buffer();
+//!     image.fill([0.5; 3]); // your renderer: the mean of `spp` new samples of each pixel
+//!     background.push_image(spp, image)?;
+//!     background.judge()?;
+//!     let news = background.news()?;
+//!     news.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+//! }
+//! background.finish()?;
+//! assert!(background.into_session()?.is_done());
+//! # Ok::<(), noisefloor::SessionError>(())
+//! ```
+
+use crate::criterion::StoppingCriterion;
+use crate::film::{Film, FilmError};
+use crate::rgb::Rgb;
+use crate::session::{Session, SessionError, Stop};
+use crate::source::Request;
+use crate::tile::{Tile, TileGrid, TilePixels};
+use crate::watch::Warning;
+use std::any::Any;
+use std::collections::{HashMap, VecDeque};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+
+/// What becomes of a pass while as many wait as may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WhenFull {
+    /// [`Background::judge`] waits until there is room.
+    Wait,
+    /// The pass is added to the one before: the k-th batch of a tile, or of the image, to its k-th batch there, by
+    /// their samples. The renderer never waits; which passes become one depends on time, and stops are those of a
+    /// session that is given the passes so.
+    Merge,
+}
+
+/// What happened since [`Background::news`] was last asked.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct News {
+    /// Passes that were judged.
+    pub judged: usize,
+    /// What [`Session::judge`] returned, one call after the other.
+    pub stops: Vec<Stop>,
+    /// What [`Session::new_warnings`] returned.
+    pub warnings: Vec<Warning>,
+}
+
+/// A session on a thread of its own. See [the module](self).
+///
+/// Dropping it drops passes that wait, and ends the thread, once the verdict that is being given is.
+pub struct Background<C = Box<dyn StoppingCriterion + Send>> {
+    shared: Arc<Shared<C>>,
+    grid: TileGrid,
+    waiting: usize,
+    when_full: WhenFull,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+struct Shared<C> {
+    judged: Mutex<Judged<C>>,
+    state: Mutex<State>,
+    /// Whenever the state has changed.
+    changed: Condvar,
+}
+
+struct Judged<C> {
+    /// There until it is given back.
+    session: Option<Session<C>>,
+    /// Samples of tiles that had stopped.
+    late: Option<Film>,
+}
+
+#[derive(Default)]
+struct State {
+    /// What has been pushed since the last pass was handed over.
+    pass: Pass,
+    waiting: VecDeque<Pass>,
+    /// Whether a pass is being judged.
+    busy: bool,
+    ending: bool,
+    /// What the session wanted after the last pass.
+    requests: Vec<Request>,
+    next_pass: Option<u64>,
+    news: News,
+    failed: Option<SessionError>,
+    /// Images that were pushed, to be filled again.
+    spent: Vec<Vec<Rgb>>,
+}
+
+/// Images that are kept to be filled again.
+const SPENT: usize = 2;
+
+/// Batches between two verdicts.
+type Pass = Vec<Push>;
+
+struct Push {
+    /// The whole image, if none.
+    tile: Option<usize>,
+    spp: u64,
+    mean: Vec<Rgb>,
+}
+
+impl<C: StoppingCriterion + Send + 'static> Background<C> {
+    /// Starts the thread. At most `waiting` passes, and at least one, wait behind the one that is being judged.
+    /// Parallel work is done by rayon's global pool.
+    ///
+    /// # Errors
+    /// [`SessionError::Background`] if the system gives no thread.
+    pub fn new(session: Session<C>, waiting: usize, when_full: WhenFull) -> Result<Self, SessionError> {
+        Self::new_in(session, waiting, when_full, |work| work())
+    }
+
+    /// The same with parallel work elsewhere: `run` calls what it is given, for instance in a rayon pool of your own,
+    /// `move |work| pool.install(work)`.
+    ///
+    /// # Errors
+    /// As of [`Background::new`].
+    pub fn new_in(
+        session: Session<C>,
+        waiting: usize,
+        when_full: WhenFull,
+        run: impl Fn(&mut (dyn FnMut() + Send)) + Send + 'static,
+    ) -> Result<Self, SessionError> {
+        let grid = session.film().grid();
+        let (requests, next_pass) = (session.requests(), session.next_pass());
+        let shared = Arc::new(Shared {
+            judged: Mutex::new(Judged { session: Some(session), late: None }),
+            state: Mutex::new(State { requests, next_pass, ..State::default() }),
+            changed: Condvar::new(),
+        });
+        let of_thread = Arc::clone(&shared);
+        let thread = thread::Builder::new().name("noisefloor".into()).spawn(move || of_thread.work(run));
+        let thread = thread.map_err(|error| SessionError::Background(error.to_string()))?;
+        Ok(Self { shared, grid, waiting: waiting.max(1), when_full, thread: Mutex::new(Some(thread)) })
+    }
+
+    /// An image for [`Background::push_image`], of an earlier pass if one is done: what is in it is of no use.
+    pub fn buffer(&self) -> Vec<Rgb> {
+        let spent = self.shared.state().spent.pop();
+        spent.unwrap_or_else(|| vec![[0.0; 3]; self.grid.width() * self.grid.height()])
+    }
+
+    /// As [`Session::push_image`], later. Tiles that are done by then have the samples at the end.
+    ///
+    /// # Errors
+    /// [`SessionError::Image`] if its size is not the image's, and what failed in the background.
+    pub fn push_image(&self, spp: u64, image: Vec<Rgb>) -> Result<(), SessionError> {
+        let expected = self.grid.width() * self.grid.height();
+        if image.len() != expected {
+            return Err(SessionError::Image { got: image.len(), expected });
+        }
+        self.add(Push { tile: None, spp, mean: image })
+    }
+
+    /// As [`Session::push`], later. A tile that is done by then has the samples at the end.
+    ///
+    /// # Errors
+    /// [`SessionError::Film`] if the tile does not exist or the size differs, and what failed in the background.
+    pub fn push(&self, tile: usize, spp: u64, mean: Vec<Rgb>) -> Result<(), SessionError> {
+        if tile >= self.grid.len() {
+            return Err(FilmError::Tile(tile, self.grid.len()).into());
+        }
+        let (got, expected) = (mean.len(), self.grid.tile(tile).pixels());
+        if got != expected {
+            return Err(FilmError::Pixels { tile, got, expected }.into());
+        }
+        self.add(Push { tile: Some(tile), spp, mean })
+    }
+
+    fn add(&self, push: Push) -> Result<(), SessionError> {
+        let mut state = self.shared.state();
+        state.failed.clone().map_or(Ok(()), Err)?;
+        state.pass.push(push);
+        Ok(())
+    }
+
+    /// Hands over what was pushed since the last call, to be judged.
+    ///
+    /// # Errors
+    /// What failed in the background, now or before: see [`Background::news`].
+    pub fn judge(&self) -> Result<(), SessionError> {
+        let mut state = self.shared.state();
+        if self.when_full == WhenFull::Wait {
+            let full = |state: &mut State| state.failed.is_none() && state.waiting.len() >= self.waiting;
+            state = self.shared.wait_while(state, full);
+        }
+        state.failed.clone().map_or(Ok(()), Err)?;
+        let pass = std::mem::take(&mut state.pass);
+        if state.waiting.len() < self.waiting {
+            state.waiting.push_back(pass);
+        } else if let Some(last) = state.waiting.back_mut() {
+            let spent = merge(last, pass);
+            state.keep(spent);
+        }
+        drop(state);
+        self.shared.changed.notify_all();
+        Ok(())
+    }
+
+    /// What happened since the last call. It does not wait.
+    ///
+    /// # Errors
+    /// What [`Session::push`] or [`Session::judge`] returned, and [`SessionError::Background`] if the criterion
+    /// panicked. Nothing is pushed or judged after that, and all other calls return it, too.
+    pub fn news(&self) -> Result<News, SessionError> {
+        let mut state = self.shared.state();
+        state.failed.clone().map_or(Ok(()), Err)?;
+        Ok(std::mem::take(&mut state.news))
+    }
+
+    /// As [`Session::next_pass`], after the last pass that was judged. It does not wait.
+    pub fn next_pass(&self) -> Option<u64> {
+        self.shared.state().next_pass
+    }
+
+    /// As [`Session::requests`], after the last pass that was judged; it does not wait. What was handed over since is
+    /// not in it, so count samples and points yourself instead of by [`Request::first`] and [`Request::sequence`].
+    pub fn requests(&self) -> Vec<Request> {
+        self.shared.state().requests.clone()
+    }
+
+    /// Whether every tile is done, by the passes that were judged.
+    pub fn is_done(&self) -> bool {
+        self.shared.state().requests.is_empty()
+    }
+
+    /// Waits until no pass waits, and says what happened as [`Background::news`] does.
+    ///
+    /// # Errors
+    /// As of [`Background::news`].
+    pub fn finish(&self) -> Result<News, SessionError> {
+        let at_work = |state: &mut State| state.failed.is_none() && (state.busy || !state.waiting.is_empty());
+        drop(self.shared.wait_while(self.shared.state(), at_work));
+        self.news()
+    }
+
+    /// Looks at the session as the last pass left it, to save a checkpoint or to show the picture: waits for the
+    /// verdict that is being given, and the next one waits for `look`. Samples that came after their tile had
+    /// stopped are not in it.
+    ///
+    /// # Errors
+    /// [`SessionError::Background`] if the criterion panicked.
+    pub fn look<T>(&self, look: impl FnOnce(&Session<C>) -> T) -> Result<T, SessionError> {
+        let judged = self.shared.judged.lock().map_err(|_| self.shared.failure())?;
+        judged.session.as_ref().map(look).ok_or_else(|| self.shared.failure())
+    }
+
+    /// Waits until no pass waits, and gives the session back, with the samples that came after their tile had
+    /// stopped. What was pushed and not handed over is lost. An error of a push or of a verdict is none of this
+    /// call: ask [`Background::finish`] before.
+    ///
+    /// # Errors
+    /// [`SessionError::Background`] if the criterion panicked.
+    pub fn into_session(self) -> Result<Session<C>, SessionError> {
+        self.take_session()
+    }
+
+    /// As [`Background::into_session`], once: for handles of other languages, which others may hold.
+    ///
+    /// # Errors
+    /// As of [`Background::into_session`], and the second time.
+    #[doc(hidden)]
+    pub fn take_session(&self) -> Result<Session<C>, SessionError> {
+        drop(self.finish());
+        self.end();
+        let mut judged = self.shared.judged.lock().map_err(|_| self.shared.failure())?;
+        let (session, late) = (judged.session.take(), judged.late.take());
+        let gone = || SessionError::Background("the session was given back".into());
+        let mut session = session.ok_or_else(gone)?;
+        self.shared.state().failed.get_or_insert_with(gone);
+        self.shared.changed.notify_all();
+        if let Some(late) = late {
+            session.add_late(&late)?;
+        }
+        Ok(session)
+    }
+}
+
+impl<C> Background<C> {
+    /// Ends the thread.
+    fn end(&self) {
+        self.shared.state().ending = true;
+        self.shared.changed.notify_all();
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(thread) = thread {
+            // What it panicked with, if it did, was caught
+            drop(thread.join());
+        }
+    }
+}
+
+impl<C> Drop for Background<C> {
+    fn drop(&mut self) {
+        self.shared.state().waiting.clear();
+        self.end();
+    }
+}
+
+impl<C> Shared<C> {
+    /// The state, which is whole at any time: nothing panics while it is locked.
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait_while<'a>(
+        &self,
+        state: MutexGuard<'a, State>,
+        condition: impl FnMut(&mut State) -> bool,
+    ) -> MutexGuard<'a, State> {
+        self.changed.wait_while(state, condition).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Why there is no session.
+    fn failure(&self) -> SessionError {
+        let failed = self.state().failed.clone();
+        failed.unwrap_or_else(|| SessionError::Background("the criterion panicked".into()))
+    }
+}
+
+impl<C: StoppingCriterion + Send> Shared<C> {
+    /// What the thread does.
+    fn work(&self, run: impl Fn(&mut (dyn FnMut() + Send))) {
+        loop {
+            let mut state = self.wait_while(self.state(), |state| state.waiting.is_empty() && !state.ending);
+            let Some(pass) = state.waiting.pop_front() else { return };
+            state.busy = true;
+            drop(state);
+            self.changed.notify_all();
+
+            let mut found = None;
+            let judged = catch_unwind(AssertUnwindSafe(|| run(&mut || found = Some(self.take(&pass)))));
+            let nothing = || Err(SessionError::Background("its work was not done where it was sent".into()));
+            let found = match judged {
+                Ok(()) => found.unwrap_or_else(nothing),
+                Err(panic) => {
+                    Err(SessionError::Background(format!("the criterion panicked: {}", said(&*panic))))
+                }
+            };
+
+            let mut state = self.state();
+            state.busy = false;
+            state.keep(pass.into_iter().filter(|push| push.tile.is_none()).map(|push| push.mean));
+            match found {
+                Ok(Found { stops, warnings, requests, next_pass }) => {
+                    (state.requests, state.next_pass) = (requests, next_pass);
+                    state.news.judged += 1;
+                    state.news.stops.extend(stops);
+                    state.news.warnings.extend(warnings);
+                }
+                Err(error) => state.failed = Some(error),
+            }
+            let failed = state.failed.is_some();
+            drop(state);
+            self.changed.notify_all();
+            if failed {
+                return;
+            }
+        }
+    }
+
+    /// Pushes a pass, and judges.
+    fn take(&self, pass: &[Push]) -> Result<Found, SessionError> {
+        let Ok(mut judged) = self.judged.lock() else { return Err(self.failure()) };
+        let Judged { session: Some(session), late } = &mut *judged else { return Err(self.failure()) };
+        let grid = session.film().grid();
+        for Push { tile, spp, mean } in pass {
+            let tiles: Vec<Tile> = match *tile {
+                Some(tile) => vec![grid.tile(tile)],
+                None => grid.tiles().collect(),
+            };
+            let pixels = |place: Tile| match tile {
+                Some(_) => TilePixels::alone(place, mean),
+                None => TilePixels::in_image(place, mean, grid.width()),
+            };
+            let (open, done): (Vec<Tile>, Vec<Tile>) =
+                tiles.into_iter().partition(|tile| session.is_open(tile.index));
+            session.push_tiles(*spp, &open, pixels)?;
+            if !done.is_empty() {
+                add_late(late, grid, *spp, &done, pixels)?;
+            }
+        }
+        let (stops, warnings) = (session.judge()?, session.new_warnings());
+        Ok(Found { stops, warnings, requests: session.requests(), next_pass: session.next_pass() })
+    }
+}
+
+/// What came of a pass.
+struct Found {
+    stops: Vec<Stop>,
+    warnings: Vec<Warning>,
+    requests: Vec<Request>,
+    next_pass: Option<u64>,
+}
+
+/// Keeps samples of tiles that had stopped.
+fn add_late<'a>(
+    late: &mut Option<Film>,
+    grid: TileGrid,
+    spp: u64,
+    tiles: &[Tile],
+    pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
+) -> Result<(), FilmError> {
+    if late.is_none() {
+        Film::check_memory(grid, 1)?;
+    }
+    let late = late.get_or_insert_with(|| Film::without_halves(grid));
+    tiles.iter().try_for_each(|tile| late.check_new(tile.index, spp))?;
+    late.add_tiles(spp, tiles, pixels);
+    Ok(())
+}
+
+impl State {
+    /// Keeps images to be filled again.
+    fn keep(&mut self, images: impl IntoIterator<Item = Vec<Rgb>>) {
+        self.spent.extend(images);
+        self.spent.truncate(SPENT);
+    }
+}
+
+/// Adds a pass to another one, and returns the images that are of no use then.
+fn merge(before: &mut Pass, pass: Pass) -> Vec<Vec<Rgb>> {
+    let mut places: HashMap<Option<usize>, VecDeque<usize>> = HashMap::new();
+    for (place, push) in before.iter().enumerate() {
+        places.entry(push.tile).or_default().push_back(place);
+    }
+    let mut spent = Vec::new();
+    for push in pass {
+        let place = places.get_mut(&push.tile).and_then(VecDeque::pop_front);
+        match place.map(|place| &mut before[place]) {
+            // A batch without samples stays one: pushing it is an error
+            Some(other) if other.spp > 0 && push.spp > 0 => {
+                let spp = other.spp.saturating_add(push.spp);
+                let weight = push.spp as f64 / spp as f64;
+                let numbers = other.mean.as_flattened_mut().iter_mut().zip(push.mean.as_flattened());
+                numbers.for_each(|(mean, &new)| {
+                    let old = f64::from(*mean);
+                    *mean = (old + (f64::from(new) - old) * weight) as f32;
+                });
+                other.spp = spp;
+                if push.tile.is_none() {
+                    spent.push(push.mean);
+                }
+            }
+            _ => before.push(push),
+        }
+    }
+    spent
+}
+
+/// What a panic said.
+fn said(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a word")
+}
+
+#[cfg(test)]
+mod tests;

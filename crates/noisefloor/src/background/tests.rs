@@ -1,0 +1,307 @@
+use super::*;
+use crate::checkpoint::Checkpoint;
+use crate::criterion::{CriterionError, FixedSpp, Verdict, View};
+use crate::params::{Params, Schedule};
+use crate::watch::Fault;
+use noisefloor_testkit::Noise;
+use proptest::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+/// A pass of a renderer: an image, or its tiles one by one, in two batches.
+struct Handed {
+    by_tile: bool,
+    spp: [u64; 2],
+    images: [Vec<Rgb>; 2],
+}
+
+/// Passes over a picture whose noise grows from tile to tile.
+fn passes(grid: TileGrid, seed: u64, count: usize) -> Vec<Handed> {
+    let mut noise = Noise::keyed(&[63, seed]);
+    let mut handed = |_| {
+        let spp = [0, 1].map(|_| 4 + noise.below(12) as u64);
+        let images = spp.map(|spp| {
+            let mut image = vec![[0.0; 3]; grid.width() * grid.height()];
+            for tile in grid.tiles() {
+                let sigma = 0.02 * 4f64.powi((tile.index % 4) as i32) / (spp as f64).sqrt();
+                for pixel in tile.rows(grid.width()).flatten() {
+                    image[pixel] = [0.4, 0.5, 0.3].map(|mean| (mean * (1.0 + sigma * noise.normal())) as f32);
+                }
+            }
+            image
+        });
+        Handed { by_tile: noise.below(2) == 0, spp, images }
+    };
+    (0..count).map(&mut handed).collect()
+}
+
+fn of_tile(grid: TileGrid, tile: Tile, image: &[Rgb]) -> Vec<Rgb> {
+    tile.rows(grid.width()).flat_map(|row| image[row].to_vec()).collect()
+}
+
+/// The session that waits, which gives open tiles what they get here.
+fn waiting<C: StoppingCriterion>(session: &mut Session<C>, passes: &[Handed]) -> Vec<Stop> {
+    let grid = session.film().grid();
+    let mut stops = Vec::new();
+    for Handed { spp, images, .. } in passes {
+        for (spp, image) in spp.iter().zip(images) {
+            for tile in grid.tiles().filter(|tile| session.is_open(tile.index)).collect::<Vec<_>>() {
+                session.push(tile.index, *spp, &of_tile(grid, tile, image)).unwrap();
+            }
+        }
+        stops.extend(session.judge().unwrap());
+    }
+    stops
+}
+
+fn hand_over<C: StoppingCriterion + Send + 'static>(background: &Background<C>, passes: &[Handed]) {
+    let grid = background.grid;
+    for Handed { by_tile, spp, images } in passes {
+        for (spp, image) in spp.iter().zip(images) {
+            if *by_tile {
+                grid.tiles().for_each(|tile| {
+                    background.push(tile.index, *spp, of_tile(grid, tile, image)).unwrap();
+                });
+            } else {
+                let mut buffer = background.buffer();
+                buffer.copy_from_slice(image);
+                background.push_image(*spp, buffer).unwrap();
+            }
+        }
+        background.judge().unwrap();
+    }
+}
+
+fn saved<C: StoppingCriterion>(session: &Session<C>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    session.checkpoint("job").unwrap().write(&mut bytes).unwrap();
+    bytes
+}
+
+fn fresh(grid: TileGrid) -> Session<crate::Oracle> {
+    let schedule = Schedule::Growing { step: 8 };
+    let params = Params::default().with_tile(grid.edge()).with_schedule(schedule).with_max_spp(400);
+    Session::new(grid.width(), grid.height(), crate::Oracle::bundled(), params).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    /// Stops, warnings and all that a checkpoint holds are those of the session that waits; samples of tiles that
+    /// had stopped are in the picture, too.
+    #[test]
+    fn stops_are_those_of_the_session_that_waits(
+        width in 16usize..70,
+        height in 16usize..70,
+        places in 1usize..4,
+        seed in 0u64..1000,
+    ) {
+        let grid = TileGrid::new(width, height, 16).unwrap();
+        let passes = passes(grid, seed, 14);
+        let mut plain = fresh(grid);
+        let stops = waiting(&mut plain, &passes);
+
+        let background = Background::new(fresh(grid), places, WhenFull::Wait).unwrap();
+        hand_over(&background, &passes);
+        let news = background.finish().unwrap();
+        prop_assert_eq!((news.judged, &news.stops), (passes.len(), &stops));
+        prop_assert_eq!(&news.warnings, &plain.new_warnings());
+        prop_assert_eq!(background.is_done(), plain.is_done());
+        prop_assert_eq!(background.next_pass(), plain.next_pass());
+        prop_assert!(background.look(saved).unwrap() == saved(&plain));
+
+        let session = background.into_session().unwrap();
+        prop_assert!(session.stops().eq(plain.stops()));
+        // Half A and half B of the first tile, whose stop, if any, was the first
+        let all: u64 = passes.iter().flat_map(|pass| pass.spp).sum();
+        let batches = || passes.iter().flat_map(|pass| pass.spp.into_iter().zip(&pass.images));
+        for tile in grid.tiles() {
+            prop_assert_eq!(session.film().spp(tile.index), all);
+            let pixel = tile.y * width + tile.x;
+            let sum: f64 = batches().map(|(spp, image)| spp as f64 * f64::from(image[pixel][1])).sum();
+            let mean = f64::from(session.film().pixel(tile.index, pixel)[1]);
+            // Some roundings of f32
+            prop_assert!((mean * all as f64 / sum - 1.0).abs() < 1e-6, "{mean} of {}", sum / all as f64);
+        }
+    }
+}
+
+#[test]
+fn a_session_that_was_given_back_goes_on() {
+    let grid = TileGrid::new(48, 32, 16).unwrap();
+    let passes = passes(grid, 7, 12);
+    let mut plain = fresh(grid);
+    waiting(&mut plain, &passes);
+    let background = Background::new(fresh(grid), 1, WhenFull::Wait).unwrap();
+    hand_over(&background, &passes[..4]);
+    background.finish().unwrap();
+    let kept = background.look(saved).unwrap();
+    drop(background);
+    let resumed = fresh(grid).resume("job", Checkpoint::read(&kept[..]).unwrap()).unwrap();
+    let background = Background::new(resumed, 3, WhenFull::Wait).unwrap();
+    hand_over(&background, &passes[4..]);
+    background.finish().unwrap();
+    assert!(background.look(saved).unwrap() == saved(&plain));
+}
+
+/// Converged after 100 samples; `judge` is called at each verdict.
+struct Calls<F>(F);
+
+impl<F: FnMut()> StoppingCriterion for Calls<F> {
+    fn name(&self) -> String {
+        "calls".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        self.0();
+        Ok(tiles.iter().map(|tile| Verdict::new(view.film.spp(tile.index) >= 100)).collect())
+    }
+}
+
+fn of_calls<F: FnMut() + Send>(call: F) -> Session<Calls<F>> {
+    Session::new(32, 16, Calls(call), Params::default().with_tile(16).with_max_spp(1 << 20)).unwrap()
+}
+
+fn grey<C: StoppingCriterion + Send + 'static>(background: &Background<C>) -> Result<(), SessionError> {
+    let mut image = background.buffer();
+    image.fill([0.5; 3]);
+    background.push_image(16, image)?;
+    background.judge()
+}
+
+#[test]
+fn a_criterion_that_panics_is_an_error_everywhere() {
+    for when_full in [WhenFull::Wait, WhenFull::Merge] {
+        let session = of_calls(|| panic!("no verdict today"));
+        let background = Background::new(session, 1, when_full).unwrap();
+        // Some may be handed over before it panics; none hangs
+        let failed = (0..1000).find_map(|_| grey(&background).err().or_else(|| background.finish().err()));
+        let said = "judging in the background failed: the criterion panicked: no verdict today";
+        assert_eq!(failed.unwrap().to_string(), said);
+        assert_eq!(background.news().unwrap_err().to_string(), said);
+        assert_eq!(grey(&background).unwrap_err().to_string(), said);
+        assert_eq!(background.look(|_| ()).unwrap_err().to_string(), said);
+        assert_eq!(background.into_session().err().map(|error| error.to_string()).as_deref(), Some(said));
+        let background = Background::new(of_calls(|| panic!("again")), 1, when_full).unwrap();
+        drop(grey(&background));
+        drop(background);
+    }
+}
+
+#[test]
+fn faults_come_later_and_the_session_comes_back() {
+    let background = Background::new(of_calls(|| ()), 1, WhenFull::Wait).unwrap();
+    grey(&background).unwrap();
+    background.finish().unwrap();
+    background.push_image(16, vec![[f32::NAN; 3]; 32 * 16]).unwrap();
+    background.judge().unwrap();
+    let fault = background.finish().unwrap_err();
+    assert!(matches!(fault, SessionError::Fault(Fault::Light { tile: 0, .. })), "{fault}");
+    assert!(background.judge().is_err_and(|error| error == fault));
+    assert_eq!(background.into_session().unwrap().film().spp(0), 16);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_at_once() {
+    let background = Background::new(of_calls(|| ()), 1, WhenFull::Wait).unwrap();
+    assert!(matches!(background.push_image(1, vec![]), Err(SessionError::Image { got: 0, expected: 512 })));
+    assert!(matches!(background.push(2, 1, vec![]), Err(SessionError::Film(FilmError::Tile(2, 2)))));
+    let short = background.push(1, 1, vec![[0.0; 3]; 3]);
+    assert!(matches!(short, Err(SessionError::Film(FilmError::Pixels { got: 3, expected: 256, .. }))));
+    background.push_image(0, background.buffer()).unwrap();
+    background.judge().unwrap();
+    assert!(matches!(background.finish(), Err(SessionError::Film(FilmError::NothingNew { .. }))));
+}
+
+/// A criterion that waits until it may go on.
+fn gate() -> (Arc<AtomicBool>, Session<Calls<impl FnMut() + Send>>) {
+    let open = Arc::new(AtomicBool::new(false));
+    let of_criterion = Arc::clone(&open);
+    let wait = move || {
+        while !of_criterion.load(Ordering::Acquire) {
+            thread::sleep(Duration::from_millis(1));
+        }
+    };
+    (open, of_calls(wait))
+}
+
+#[test]
+fn a_renderer_waits_for_room() {
+    let (open, session) = gate();
+    let background = Background::new(session, 2, WhenFull::Wait).unwrap();
+    let handed = AtomicUsize::new(0);
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            for _ in 0..6 {
+                grey(&background).unwrap();
+                handed.fetch_add(1, Ordering::AcqRel);
+            }
+        });
+        // One that is being judged, and two that wait: the first verdict is due after two passes
+        while handed.load(Ordering::Acquire) < 3 {
+            thread::sleep(Duration::from_millis(1));
+        }
+        thread::sleep(Duration::from_millis(30));
+        let most = handed.load(Ordering::Acquire);
+        assert!(most <= 4 && background.shared.state().waiting.len() == 2, "{most}");
+        open.store(true, Ordering::Release);
+    });
+    assert_eq!(background.finish().unwrap().judged, 6);
+}
+
+#[test]
+fn passes_that_find_no_room_are_added_to_the_last() {
+    let (open, session) = gate();
+    let background = Background::new(session, 1, WhenFull::Merge).unwrap();
+    for k in 0..9 {
+        background.push_image(10 + k, vec![[k as f32; 3]; 32 * 16]).unwrap();
+        background.push(1, 1, vec![[100.0; 3]; 16 * 16]).unwrap();
+        background.judge().unwrap();
+    }
+    open.store(true, Ordering::Release);
+    let news = background.finish().unwrap();
+    assert!((1..9).contains(&news.judged), "{}", news.judged);
+    let session = background.into_session().unwrap();
+    let film = session.film();
+    assert_eq!([film.spp(0), film.spp(1)], [126, 135]);
+    let mean = (0..9).map(|k| f64::from(k * (10 + k))).sum::<f64>() / 126.0;
+    assert!((f64::from(film.pixel(0, 0)[0]) / mean - 1.0).abs() < 1e-6);
+    assert!((f64::from(film.pixel(1, 16)[0]) / ((mean * 126.0 + 900.0) / 135.0) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn dropping_ends_the_thread() {
+    let (open, session) = gate();
+    let background = Background::new(session, 8, WhenFull::Wait).unwrap();
+    (0..8).for_each(|_| grey(&background).unwrap());
+    let shared = Arc::downgrade(&background.shared);
+    open.store(true, Ordering::Release);
+    drop(background);
+    assert!(shared.upgrade().is_none());
+}
+
+/// What is parallel runs where the embedder wants it.
+#[test]
+fn work_goes_to_the_pool_of_the_embedder() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+    let threads = Arc::new(AtomicUsize::new(0));
+    let of_criterion = Arc::clone(&threads);
+    let count = move || {
+        let inside = rayon::current_thread_index().is_some();
+        of_criterion.store(10 * rayon::current_num_threads() + usize::from(inside), Ordering::Release);
+    };
+    let background =
+        Background::new_in(of_calls(count), 1, WhenFull::Wait, move |work| pool.install(work)).unwrap();
+    (0..2).for_each(|_| grey(&background).unwrap());
+    background.finish().unwrap();
+    assert_eq!(threads.load(Ordering::Acquire), 31);
+    // And work that never runs is no pass that hangs
+    let session = Session::new(32, 16, FixedSpp(8), Params::default().with_tile(16)).unwrap();
+    let background = Background::new_in(session, 1, WhenFull::Wait, |_| ()).unwrap();
+    drop(grey(&background));
+    assert!(matches!(background.finish(), Err(SessionError::Background(_))));
+}
