@@ -50,6 +50,12 @@
 // Plain sRGB: multiply by the exposure, clamp, encode.
 #define NF_TONE_SRGB 1
 
+// nf_background_judge waits until there is room for the pass.
+#define NF_FULL_WAIT 0
+
+// The pass is added to the one before: the renderer never waits.
+#define NF_FULL_MERGE 1
+
 // The tile is open: it gets more samples.
 #define NF_REASON_OPEN 0
 
@@ -116,6 +122,9 @@ typedef enum {
     NF_STATUS_HANDLE = 13,
 } NfStatus;
 
+// A session on a thread of its own: the renderer hands over a pass and goes on.
+typedef struct NfBackground NfBackground;
+
 // A trained model with the share of people who are to see no noise. It never changes, and any
 // number of sessions can be made from it.
 typedef struct NfOracle NfOracle;
@@ -166,6 +175,17 @@ typedef struct {
     const NfTone *tone;
 } NfParams;
 
+// Denoises a whole picture, noisy, into denoised: each has 3 * width * height floats. albedo and normal are NULL, or
+// as large. What it writes hangs on these arguments alone. Returns 0, or anything else if it failed. It cannot use
+// sessions.
+typedef int32_t (*NfDenoise)(void *user,
+                             uint32_t width,
+                             uint32_t height,
+                             const float *noisy,
+                             const float *albedo,
+                             const float *normal,
+                             float *denoised);
+
 // A rectangle of pixels that stops as a whole. Tiles lie in rows from the top left.
 typedef struct {
     // Its number: 0 to nf_session_tile_count - 1.
@@ -196,16 +216,19 @@ typedef struct {
     uint64_t point;
 } NfRequest;
 
-// Denoises a whole picture, noisy, into denoised: each has 3 * width * height floats. albedo and normal are NULL, or
-// as large. What it writes hangs on these arguments alone. Returns 0, or anything else if it failed. It cannot use
-// sessions.
-typedef int32_t (*NfDenoise)(void *user,
-                             uint32_t width,
-                             uint32_t height,
-                             const float *noisy,
-                             const float *albedo,
-                             const float *normal,
-                             float *denoised);
+// Where a session in the background stands.
+typedef struct {
+    // Passes that were judged.
+    uint64_t judged;
+    // Samples per pixel that the next pass over the whole picture should have; 0 when all tiles are done.
+    uint64_t next_pass;
+    // Open tiles, after the last pass that was judged.
+    size_t open_tiles;
+    // Stops so far. A tile that was open again counts twice.
+    size_t stops;
+    // Warnings so far, for nf_background_warning.
+    size_t warnings;
+} NfBackgroundState;
 
 // Where a tile stands.
 typedef struct {
@@ -310,29 +333,6 @@ NfStatus nf_session_new(size_t width,
                         const NfParams *params,
                         NfSession **session);
 
-// Frees a session, once calls on it have returned. NULL is ignored, a second time is NF_STATUS_HANDLE.
-NfStatus nf_session_free(NfSession *session);
-
-// The number of tiles; 0 if session is NULL.
-size_t nf_session_tile_count(const NfSession *session);
-
-// Where a tile lies.
-NfStatus nf_session_tile(const NfSession *session, size_t index, NfTile *tile);
-
-// What the open tiles need next, into an array for as many requests as there are tiles (capacity says how
-// many). count becomes the number of requests: 0 when all tiles are done.
-NfStatus nf_session_requests(const NfSession *session,
-                             NfRequest *requests,
-                             size_t capacity,
-                             size_t *count);
-
-// Judges the tiles that are due. newly_done, which may be NULL, becomes the number of tiles that are now
-// done and were not before. The first verdicts wait until every open tile has samples, unless tone_mapping
-// is NF_TONE_SRGB. When the exposure of the finished picture turns out to be another than was estimated,
-// tiles that were done can be open again: render until there are no requests.
-NfStatus nf_session_judge(const NfSession *session,
-                          size_t *newly_done);
-
 // As nf_session_new, for pictures that are denoised before anyone sees them: a tile is done when what denoise makes of
 // the picture has lost at most lost just-objectionable differences (JOD) against the converged one, 0.3 say, 19 of 20 tiles
 // by the vision model; nobody has been asked about denoised pictures. See also nf_session_undenoised. Both halves of the samples are denoised apart, so a
@@ -349,6 +349,49 @@ NfStatus nf_session_new_denoised(size_t width,
                                  size_t floats,
                                  const NfParams *params,
                                  NfSession **session);
+
+// Frees a session, once calls on it have returned. NULL is ignored, a second time is NF_STATUS_HANDLE.
+NfStatus nf_session_free(NfSession *session);
+
+// The number of tiles; 0 if session is NULL.
+size_t nf_session_tile_count(const NfSession *session);
+
+// Where a tile lies.
+NfStatus nf_session_tile(const NfSession *session, size_t index, NfTile *tile);
+
+// What the open tiles need next, into an array for as many requests as there are tiles (capacity says how
+// many). count becomes the number of requests: 0 when all tiles are done.
+NfStatus nf_session_requests(const NfSession *session,
+                             NfRequest *requests,
+                             size_t capacity,
+                             size_t *count);
+
+// Samples per pixel that the next pass over the whole picture should have, for a renderer of whole frames: what one
+// half lacks until the first of the open tiles can be judged, so that nothing has to be read back from a GPU before.
+// spp becomes 0 when all tiles are done.
+NfStatus nf_session_next_pass(const NfSession *session,
+                              uint64_t *spp);
+
+// Judges the tiles that are due. newly_done, which may be NULL, becomes the number of tiles that are now
+// done and were not before. The first verdicts wait until every open tile has samples, unless tone_mapping
+// is NF_TONE_SRGB. When the exposure of the finished picture turns out to be another than was estimated,
+// tiles that were done can be open again: render until there are no requests.
+NfStatus nf_session_judge(const NfSession *session,
+                          size_t *newly_done);
+
+// Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
+// tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
+// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
+// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
+// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
+// values are interpolated linearly. Tables are kept until the program ends, each once.
+NfStatus nf_session_set_tone_table(const NfSession *session,
+                                   float exposure,
+                                   float toe,
+                                   float top,
+                                   const float *table,
+                                   size_t floats,
+                                   size_t edge);
 
 // Just-objectionable differences that each tile to be shown has lost, by its last verdict: a double for each tile, NaN
 // before the first. NF_STATUS_UNAVAILABLE if the session has no denoiser.
@@ -384,20 +427,6 @@ NfStatus nf_tone_of_table(float toe,
 // Frees a tone mapping. NULL is ignored, a second time is NF_STATUS_HANDLE.
 NfStatus nf_tone_free(NfTone *tone);
 
-// Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
-// tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
-// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
-// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
-// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
-// values are interpolated linearly. Tables are kept until the program ends, each once.
-NfStatus nf_session_set_tone_table(const NfSession *session,
-                                   float exposure,
-                                   float toe,
-                                   float top,
-                                   const float *table,
-                                   size_t floats,
-                                   size_t edge);
-
 // Adds the mean of spp new samples per pixel of a tile: rows of the tile from the top, floats = 3 * width *
 // height of the tile. Tiles that are done accept samples, too: they improve, and stay done.
 NfStatus nf_session_push(const NfSession *session,
@@ -423,6 +452,60 @@ NfStatus nf_session_push_image(const NfSession *session,
                                const float *image,
                                size_t floats,
                                size_t channels);
+
+// Lets a session judge in the background, on a thread of its own. At most `waiting` passes, and at least one, wait
+// behind the one that is being judged; when_full is NF_FULL_WAIT or NF_FULL_MERGE. Until nf_background_end gives the
+// session back, calls on it are NF_STATUS_ARGUMENT, but for nf_session_tile_count, nf_session_tile and
+// nf_session_free. Stops are those of the same session without this, to the bit, and come later.
+NfStatus nf_background_begin(const NfSession *session,
+                             size_t waiting,
+                             uint32_t when_full,
+                             NfBackground **background);
+
+// Adds a batch to the pass: the mean of spp new samples per pixel of the whole picture, with this many channels per
+// pixel, of which the first three are red, green and blue; floats = channels * width * height. It is copied, also from
+// memory that is mapped for a GPU. Tiles that are done when it is their turn have the samples at the end.
+NfStatus nf_background_push_image(const NfBackground *background,
+                                  uint64_t spp,
+                                  const float *image,
+                                  size_t floats,
+                                  size_t channels);
+
+// Adds a batch of one tile to the pass: as nf_session_push, later.
+NfStatus nf_background_push(const NfBackground *background,
+                            size_t tile,
+                            uint64_t spp,
+                            const float *mean,
+                            size_t floats);
+
+// Hands over the pass: all batches since the last call. They are pushed and judged in the background. What fails
+// there, such as NF_STATUS_FAULT, is the status of this or a later call.
+NfStatus nf_background_judge(const NfBackground *background);
+
+// Where the session stands, without waiting. Its status is what failed in the background, if anything has.
+NfStatus nf_background_state(const NfBackground *background,
+                             NfBackgroundState *state);
+
+// What the open tiles wanted after the last pass that was judged, as nf_session_requests. What was handed over since
+// is not in it, so number samples yourself instead of by `first` and `point`.
+NfStatus nf_background_requests(const NfBackground *background,
+                                NfRequest *requests,
+                                size_t capacity,
+                                size_t *count);
+
+// One of the warnings that nf_background_state has counted, by its number from 0 on: as nf_session_warning.
+NfStatus nf_background_warning(const NfBackground *background,
+                               size_t index,
+                               char *text,
+                               size_t bytes);
+
+// Waits until no pass waits. Its status is what failed in the background, if anything has.
+NfStatus nf_background_finish(const NfBackground *background);
+
+// Waits until no pass waits, gives the session back to its handle, with samples that came after their tile had
+// stopped, and frees the background. What failed in a push or a verdict is no error of this call: ask
+// nf_background_finish before. NULL is ignored, a second time is NF_STATUS_HANDLE.
+NfStatus nf_background_end(NfBackground *background);
 
 // Where all tiles stand, in their order, into an array for as many states as there are tiles (capacity says
 // how many).

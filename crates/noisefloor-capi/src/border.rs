@@ -69,6 +69,12 @@ pub(crate) unsafe fn room<'a, T>(
     unsafe { array_mut(pointer, wanted, wanted, what) }
 }
 
+/// Channels of a pixel, of which the first three are colours.
+pub(crate) fn channels(count: usize) -> Result<(), Failure> {
+    let wrong = || Failure::new(NfStatus::Argument, format!("{count} channels: 3 to 64 are allowed"));
+    if (3..=64).contains(&count) { Ok(()) } else { Err(wrong()) }
+}
+
 fn expect(got: usize, wanted: usize, what: &str) -> Result<(), Failure> {
     if got == wanted {
         return Ok(());

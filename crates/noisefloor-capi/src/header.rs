@@ -42,8 +42,19 @@ fn the_header_is_that_of_the_sources() {
     let config = cbindgen::Config::from_file(package.join("cbindgen.toml")).unwrap();
     // In the order in which one reads a header
     let sources = [
-        "status", "oracle", "params", "eyes", "session", "denoise", "tone", "push", "results", "files",
-        "check", "tune",
+        "status",
+        "oracle",
+        "params",
+        "eyes",
+        "session",
+        "denoise",
+        "tone",
+        "push",
+        "background",
+        "results",
+        "files",
+        "check",
+        "tune",
     ];
     let builder = cbindgen::Builder::new().with_config(config);
     let builder = sources.iter().fold(builder, |b, name| b.with_src(package.join(format!("src/{name}.rs"))));

@@ -3,7 +3,7 @@
 use crate::border;
 use crate::handle;
 use crate::session::NfSession;
-use crate::status::{Failure, NfStatus, guard};
+use crate::status::{NfStatus, guard};
 use noisefloor::Rgb;
 
 /// Adds the mean of spp new samples per pixel of a tile: rows of the tile from the top, floats = 3 * width *
@@ -58,12 +58,7 @@ pub unsafe extern "C" fn nf_session_push_image(
 ) -> NfStatus {
     guard(|| {
         let session = handle::get(session)?;
-        if !(3..=64).contains(&channels) {
-            return Err(Failure::new(
-                NfStatus::Argument,
-                format!("{channels} channels: 3 to 64 are allowed"),
-            ));
-        }
+        border::channels(channels)?;
         let (tile, width) = (session.tile(tile)?, session.grid.width());
         let wanted = channels * width * session.grid.height();
         // SAFETY: promised by the caller.

@@ -33,7 +33,8 @@ pub(crate) enum Judging {
 
 /// A session, and what became of its denoised pictures.
 pub(crate) struct Judged {
-    session: Session<Box<dyn StoppingCriterion + Send>>,
+    /// Elsewhere while it judges in the background.
+    session: Option<Session<Box<dyn StoppingCriterion + Send>>>,
     pub(crate) record: Option<Arc<Mutex<DenoisedRecord>>>,
 }
 
@@ -41,13 +42,13 @@ impl Deref for Judged {
     type Target = Session<Box<dyn StoppingCriterion + Send>>;
 
     fn deref(&self) -> &Self::Target {
-        &self.session
+        self.session.as_ref().expect("a session that is elsewhere is not locked")
     }
 }
 
 impl DerefMut for Judged {
     fn deref_mut(&mut self) -> &mut Self::Target {
-        &mut self.session
+        self.session.as_mut().expect("a session that is elsewhere is not locked")
     }
 }
 
@@ -61,7 +62,7 @@ impl Judging {
                 (Box::new(quality), Some(record))
             }
         };
-        Ok(Judged { session: Session::new(width, height, criterion, params)?, record })
+        Ok(Judged { session: Some(Session::new(width, height, criterion, params)?), record })
     }
 }
 
@@ -110,9 +111,29 @@ impl NfSession {
     }
 
     pub(crate) fn lock(&self) -> Result<MutexGuard<'_, Judged>, Failure> {
+        let locked = self.lock_any()?;
+        let away = "the session judges in the background: nf_background_end gives it back";
+        if locked.session.is_some() { Ok(locked) } else { Err(Failure::new(NfStatus::Argument, away)) }
+    }
+
+    fn lock_any(&self) -> Result<MutexGuard<'_, Judged>, Failure> {
         not_while_denoising()?;
         let broken = "the session cannot be used since an error inside the library";
         self.judged.lock().map_err(|_| Failure::new(NfStatus::Internal, broken))
+    }
+
+    /// Hands the session out, to judge in the background.
+    pub(crate) fn lend(&self) -> Result<Session<Box<dyn StoppingCriterion + Send>>, Failure> {
+        let away = || Failure::new(NfStatus::Internal, "the session is elsewhere");
+        self.lock()?.session.take().ok_or_else(away)
+    }
+
+    pub(crate) fn take_back(
+        &self,
+        session: Session<Box<dyn StoppingCriterion + Send>>,
+    ) -> Result<(), Failure> {
+        self.lock_any()?.session = Some(session);
+        Ok(())
     }
 
     /// Takes the place of what the session was.
@@ -121,7 +142,8 @@ impl NfSession {
         let mut fresh =
             self.judging.fresh((self.grid.width(), self.grid.height()), locked.params().clone())?;
         fresh.set_pixels(locked.pixels());
-        *locked = Judged { session: fresh.session.resume(job, checkpoint)?, record: fresh.record };
+        let Judged { session: Some(session), record } = fresh else { return Ok(()) };
+        *locked = Judged { session: Some(session.resume(job, checkpoint)?), record };
         Ok(())
     }
 
@@ -136,6 +158,12 @@ impl NfSession {
 impl From<Tile> for NfTile {
     fn from(Tile { index, x, y, width, height }: Tile) -> Self {
         Self { index, x, y, width, height }
+    }
+}
+
+impl From<Request> for NfRequest {
+    fn from(Request { tile, first, spp, sequence, .. }: Request) -> Self {
+        Self { tile: tile.into(), first, spp, sequence: sequence.number, point: sequence.first }
     }
 }
 
@@ -267,11 +295,20 @@ pub unsafe extern "C" fn nf_session_requests(
         let wanted = session.lock()?.requests();
         // SAFETY: promised by the caller.
         unsafe { border::write(count, wanted.len(), "count") }?;
-        for (place, Request { tile, first, spp, sequence, .. }) in room.iter_mut().zip(wanted) {
-            let (sequence, point) = (sequence.number, sequence.first);
-            *place = NfRequest { tile: tile.into(), first, spp, sequence, point };
-        }
+        room.iter_mut().zip(wanted).for_each(|(place, request)| *place = request.into());
         Ok(())
+    })
+}
+
+/// Samples per pixel that the next pass over the whole picture should have, for a renderer of whole frames: what one
+/// half lacks until the first of the open tiles can be judged, so that nothing has to be read back from a GPU before.
+/// spp becomes 0 when all tiles are done.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_session_next_pass(session: *const NfSession, spp: *mut u64) -> NfStatus {
+    guard(|| {
+        let found = handle::get(session)?.lock()?.next_pass().unwrap_or(0);
+        // SAFETY: promised by the caller.
+        unsafe { border::write(spp, found, "spp") }
     })
 }
 

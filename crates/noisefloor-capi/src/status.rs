@@ -183,6 +183,7 @@ impl From<SessionError> for Failure {
             SessionError::Film(error) => error.into(),
             SessionError::Criterion(error) => error.into(),
             SessionError::Fault(fault) => Self::new(NfStatus::Fault, fault.to_string()),
+            SessionError::Background(_) => Self::new(NfStatus::Internal, error.to_string()),
             other => Self::new(NfStatus::Argument, other.to_string()),
         }
     }

@@ -17,6 +17,7 @@ use noisefloor::{Oracle, Params, Rgb, Session, Tile, ToneMapping, criterion::Cri
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
 
+mod background;
 mod denoise;
 #[cfg(target_os = "linux")]
 mod memory;
