@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""What the oracle costs beside a GPU: wall time until the stop, over that of the same samples without an oracle.
+
+    python3 benchmarks/gpu.py [--sizes 1920x1080,3840x2160] [--renderers cuda,cornell] [--tile 64] [--limit 2048]
+
+Needs a machine with an NVIDIA card, the module `noisefloor`, and CuPy (`cuda`) or Mitsuba 3 (`cornell`, or the path of a
+scene of Mitsuba). `--renderers numpy` needs no card: it makes noise on the processor, to try the script. Each renderer and
+size is rendered until all tiles stop, beside a session that waits for each verdict and beside one in the background, and
+then alone, with the passes of each.
+"""
+
+import argparse
+import platform
+import subprocess
+import time
+
+import numpy as np
+
+import noisefloor
+
+# A room of two walls, a floor and a ball under a lamp and a sky: as little work for each sample as a path tracer can
+# have, so that the oracle has the least time.
+KERNEL = r"""
+struct V { float x, y, z; };
+__device__ V add(V a, V b, float k) { V r = {a.x + k * b.x, a.y + k * b.y, a.z + k * b.z}; return r; }
+__device__ float dot(V a, V b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+__device__ V unit(V a) { float k = rsqrtf(dot(a, a)); V r = {k * a.x, k * a.y, k * a.z}; return r; }
+// PCG (O'Neill 2014), one stream for each pixel and pass
+__device__ float draw(unsigned *s) {
+    *s = *s * 747796405u + 2891336453u;
+    unsigned w = ((*s >> ((*s >> 28) + 4)) ^ *s) * 277803737u;
+    return ((w >> 22) ^ w) * 2.3283064e-10f;
+}
+extern "C" __global__ void trace(float *mean, int width, int height, int spp, unsigned seed) {
+    int i = blockIdx.x * blockDim.x + threadIdx.x;
+    if (i >= width * height) return;
+    unsigned s = (i * 9781u + seed * 6271u) | 1u;
+    for (int k = 0; k < 4; k++) draw(&s);
+    V sum = {0, 0, 0}, ball = {0, -0.5f, 0};
+    for (int n = 0; n < spp; n++) {
+        V o = {0, 0, 3}, light = {1, 1, 1};
+        V d = unit({(2 * (i % width + draw(&s)) - width) / height, 1 - 2 * (i / width + draw(&s)) / height, -1.8f});
+        for (int bounce = 0; bounce < 6; bounce++) {
+            float t = 1e9f, b = dot(add(o, ball, -1), d);
+            V normal = {0, 0, 0}, colour = {.7f, .7f, .7f}, from = add(o, ball, -1);
+            float root = b * b - dot(from, from) + 0.25f, near = -b - sqrtf(fmaxf(root, 0));
+            if (root > 0 && near > 1e-3f) { t = near; normal = unit(add(from, d, t)); colour = {.9f, .6f, .2f}; }
+            float floor_at = (-1 - o.y) / d.y, back = (-1.5f - o.z) / d.z, left = (-1.5f - o.x) / d.x;
+            if (floor_at > 1e-3f && floor_at < t) { t = floor_at; normal = {0, 1, 0}; colour = {.7f, .7f, .7f}; }
+            if (back > 1e-3f && back < t) { t = back; normal = {0, 0, 1}; colour = {.7f, .7f, .7f}; }
+            if (left > 1e-3f && left < t) { t = left; normal = {1, 0, 0}; colour = {.7f, .1f, .1f}; }
+            if (t > 1e8f) {
+                float lamp = d.y > 0.9f ? 2.5f : 0.4f;
+                sum = {sum.x + light.x * lamp, sum.y + light.y * lamp, sum.z + light.z * lamp};
+                break;
+            }
+            o = add(add(o, d, t), normal, 1e-3f);
+            light = {light.x * colour.x, light.y * colour.y, light.z * colour.z};
+            float z = 2 * draw(&s) - 1, phi = 6.2831853f * draw(&s), r = sqrtf(1 - z * z);
+            V sphere = {r * cosf(phi), r * sinf(phi), z};
+            d = unit(add(normal, sphere, 0.999f));
+        }
+    }
+    mean[3 * i] = sum.x / spp;
+    mean[3 * i + 1] = sum.y / spp;
+    mean[3 * i + 2] = sum.z / spp;
+}
+"""
+
+
+def renderer(kind, width, height):
+    """A function of (spp, seed) that returns an array on the device when it is done."""
+    if kind == "numpy":
+        light = 0.2 + np.abs(np.sin(np.arange(width) / 97))[None, :, None] * np.ones((height, 1, 3))
+        def render(spp, seed):
+            noise = np.random.default_rng(seed).standard_normal((height, width, 3), np.float32)
+            return (light * (1 + 0.2 * noise / np.sqrt(spp))).astype(np.float32)
+        return render
+    if kind == "cuda":
+        import cupy
+        trace = cupy.RawKernel(KERNEL, "trace", options=("--std=c++14",))
+        mean = cupy.empty((height, width, 3), cupy.float32)
+        def render(spp, seed):
+            blocks = ((width * height + 127) // 128,)
+            trace(blocks, (128,), (mean, *map(np.int32, (width, height, spp)), np.uint32(seed)))
+            cupy.cuda.Device().synchronize()
+            return mean
+        return render
+    import drjit
+    import mitsuba
+    mitsuba.set_variant("cuda_ad_rgb")
+    if kind == "cornell":
+        scene = mitsuba.cornell_box()
+        scene["sensor"]["film"] |= {"width": width, "height": height, "rfilter": {"type": "box"}}
+        scene = mitsuba.load_dict(scene)
+    else:
+        scene = mitsuba.load_file(kind, resx=width, resy=height)
+    def render(spp, seed):
+        image = mitsuba.render(scene, spp=spp, seed=seed)[:, :, :3]
+        drjit.eval(image)
+        drjit.sync_thread()
+        return image
+    return render
+
+
+def session(width, height, tile, limit):
+    params = noisefloor.Params(tile=tile, max_spp=limit, schedule="growing", step=16)
+    return noisefloor.Session(width, height, params=params)
+
+
+def alone(render, passes):
+    start = time.perf_counter()
+    for seed, spp in enumerate(passes):
+        render(spp, seed)
+    return time.perf_counter() - start
+
+
+def waiting(render, judged):
+    """Wall time until the stop, and the samples of the passes."""
+    passes, start = [], time.perf_counter()
+    while not judged.done:
+        passes.append(judged.next_pass)
+        judged.push_image(passes[-1], render(passes[-1], len(passes)))
+        judged.judge()
+    return time.perf_counter() - start, passes
+
+
+def background(render, judged):
+    passes, start = [], time.perf_counter()
+    with noisefloor.Background(judged) as beside:
+        while not beside.done:
+            passes.append(beside.next_pass)
+            beside.push_image(passes[-1], render(passes[-1], len(passes)))
+            beside.judge()
+        stopped = time.perf_counter() - start
+    return stopped, passes
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", default="1920x1080,3840x2160")
+    parser.add_argument("--renderers", default="cuda,cornell")
+    parser.add_argument("--tile", type=int, default=64)
+    parser.add_argument("--limit", type=int, default=2048, help="samples per pixel at which every tile stops")
+    options = parser.parse_args()
+    query = ["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"]
+    try:
+        card = subprocess.run(query, check=True, text=True, stdout=subprocess.PIPE).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        card = "no NVIDIA card"
+    print(f"{card}; {platform.processor() or platform.machine()}; noisefloor {noisefloor.__version__}")
+    print("| renderer | pixels | alone | waiting | background | waiting : alone | background : alone | beyond the stop |")
+    print("|---|---|---|---|---|---|---|---|")
+    for kind in options.renderers.split(","):
+        for size in options.sizes.split(","):
+            width, height = map(int, size.split("x"))
+            render = renderer(kind, width, height)
+            render(16, 10**6)  # compiles
+            new = lambda: session(width, height, options.tile, options.limit)
+            waited, passes = waiting(render, new())
+            beside, more = background(render, new())
+            # Each beside as many samples without an oracle
+            plain, as_many = alone(render, passes), alone(render, more)
+            print(f"| {kind} | {size} | {plain:.2f} s | {waited:.2f} s | {beside:.2f} s | ×{waited / plain:.2f} "
+                  f"| ×{beside / as_many:.2f} | {100 * (sum(more) / sum(passes) - 1):.1f} % |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
