@@ -118,10 +118,52 @@ impl Picture {
     }
 }
 
+/// DLPack's numbers of devices whose memory the processor reads: its own, and what is pinned for CUDA, ROCm or SYCL.
+const READABLE: [i64; 3] = [1, 3, 11];
+
+/// An array of numpy from a framework for GPUs, in memory that the processor reads: where it lies, or copied once by
+/// the framework itself. `None` if the object is no such array, or one that numpy reads by itself.
+///
+/// What lies on a GPU is copied by the method that its framework has for that: `get` (CuPy) or `cpu` (PyTorch), and else
+/// by what newer ones understand of DLPack, a request for another device. Dr.Jit and JAX convert when numpy asks.
+fn from_device<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let (py, numpy) = (object.py(), object.py().import("numpy")?);
+    if object.is_instance(&numpy.getattr("ndarray")?)? {
+        return Ok(None);
+    }
+    let device = match object.hasattr("__dlpack_device__")? {
+        true => Some(object.call_method0("__dlpack_device__")?.extract::<(i64, i64)>()?.0),
+        false => None,
+    };
+    match device {
+        Some(device) if READABLE.contains(&device) => {
+            // Of a kind that DLPack cannot say, such as one with gradients, numpy may know more
+            return Ok(numpy.call_method1("from_dlpack", (object,)).ok());
+        }
+        None if !object.hasattr("__cuda_array_interface__")? => return Ok(None),
+        _ => {}
+    }
+    for method in ["get", "cpu"] {
+        if object.hasattr(method)? {
+            return Ok(Some(numpy.call_method1("asarray", (object.call_method0(method)?,))?));
+        }
+    }
+    if object.hasattr("__array__")? {
+        return Ok(None);
+    }
+    let options = pyo3::types::PyDict::new(py);
+    options.set_item("device", "cpu")?;
+    Ok(Some(numpy.call_method("from_dlpack", (object,), Some(&options))?))
+}
+
 /// An array of shape (height, width, 3) of any type.
 fn array<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = object.py();
-    let array = py.import("numpy")?.call_method1("asarray", (object,));
+    let array = match from_device(object) {
+        Ok(Some(array)) => Ok(array),
+        Ok(None) => py.import("numpy")?.call_method1("asarray", (object,)),
+        Err(error) => Err(error),
+    };
     let array = array.map_err(|error| SizeError::new_err(format!("no array of pixels: {error}")))?;
     let shape = array.getattr("shape")?;
     match shape.extract::<Vec<usize>>()?[..] {

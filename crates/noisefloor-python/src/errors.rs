@@ -67,6 +67,7 @@ impl Raise for noisefloor::SessionError {
             Self::Film(error) => error.raise(),
             Self::Criterion(error) => error.raise(),
             Self::Fault(fault) => FaultError::new_err(fault.to_string()),
+            Self::Background(_) => Error::new_err(self.to_string()),
             other => ParameterError::new_err(other.to_string()),
         }
     }

@@ -18,7 +18,8 @@ pub(crate) type Criterion = Box<dyn StoppingCriterion + Send>;
 
 /// A session, and what became of its denoised pictures.
 pub(crate) struct Judged {
-    pub(crate) session: Session<Criterion>,
+    /// Elsewhere while it judges in the background.
+    pub(crate) session: Option<Session<Criterion>>,
     pub(crate) record: Option<Arc<Mutex<DenoisedRecord>>>,
 }
 

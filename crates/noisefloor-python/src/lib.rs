@@ -4,6 +4,7 @@
 //! - `errors.rs`: one exception for each kind of error;
 //! - `arrays.rs`: between numpy and slices;
 //! - `params.rs`, `oracle.rs`, `verdicts.rs`, `session.rs`: the push session;
+//! - `background.rs`: a session that judges beside the rendering;
 //! - `check.rs`: the contract of a renderer;
 //! - `eyes.rs`: what `noisefloor calibrate` has measured;
 //! - `files.rs`, `stills.rs`, `metrics.rs`: finished pictures;
@@ -15,6 +16,7 @@
 //! their own.
 
 mod arrays;
+mod background;
 mod check;
 mod errors;
 mod eyes;
@@ -35,6 +37,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _noisefloor {
+    #[pymodule_export]
+    use crate::background::PyBackground;
     #[pymodule_export]
     use crate::check::check;
     #[pymodule_export]

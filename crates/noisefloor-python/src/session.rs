@@ -11,8 +11,9 @@ use crate::verdicts::{PyRequest, PyStop, PyVerdict, TileLike};
 use noisefloor::{
     Checkpoint, Oracle, Params, Rgb, Schedule, Session, StopReason, Tile, TileGrid,
     checkpoint::CheckpointError, session::Interruption, session::SessionError, source::PixelNoise,
+    watch::Warning,
 };
-use noisefloor_denoise::DEFAULT_JODS_LOST;
+use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedRecord};
 use noisefloor_image::{WriteError, write_atomic};
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyUserWarning;
@@ -24,7 +25,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Film, oracle and limits of one picture: a renderer pushes samples, and is told which tiles need more.
 ///
@@ -51,7 +52,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) struct PySession {
     judged: Mutex<Judged>,
     judging: Judging,
-    grid: TileGrid,
+    pub(crate) grid: TileGrid,
     pixels: PixelNoise,
 }
 
@@ -62,17 +63,18 @@ impl Deref for MappedGuard<'_> {
     type Target = Session<Criterion>;
 
     fn deref(&self) -> &Self::Target {
-        &self.0.session
+        self.0.session.as_ref().expect("a session that is elsewhere is not locked")
     }
 }
 
 impl DerefMut for MappedGuard<'_> {
     fn deref_mut(&mut self) -> &mut Self::Target {
-        &mut self.0.session
+        self.0.session.as_mut().expect("a session that is elsewhere is not locked")
     }
 }
 
 const BROKEN: &str = "the session cannot be used since an error inside the library";
+const AWAY: &str = "the session judges in the background: Background.end() gives it back";
 
 impl PySession {
     /// A session that has not begun.
@@ -83,14 +85,50 @@ impl PySession {
         params: Params,
         pixels: PixelNoise,
     ) -> PyResult<Self> {
-        let judged = fresh(py, (width, height), &judging, params, pixels)?;
-        Ok(Self { grid: judged.session.film().grid(), judged: Mutex::new(judged), judging, pixels })
+        let (session, record) = fresh(py, (width, height), &judging, params, pixels)?;
+        let grid = session.film().grid();
+        Ok(Self { grid, judged: Mutex::new(Judged { session: Some(session), record }), judging, pixels })
     }
 
     /// The session, for something short. Others may have the interpreter while this waits.
     fn attached(&self, py: Python<'_>) -> PyResult<MappedGuard<'_>> {
+        let guard = MappedGuard(self.lock(py)?);
+        if guard.0.session.is_some() { Ok(guard) } else { Err(Error::new_err(AWAY)) }
+    }
+
+    fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Judged>> {
         not_while_denoising()?;
-        Ok(MappedGuard(self.judged.lock_py_attached(py).map_err(|_| Error::new_err(BROKEN))?))
+        self.judged.lock_py_attached(py).map_err(|_| Error::new_err(BROKEN))
+    }
+
+    /// Hands the session out, to judge in the background.
+    pub(crate) fn lend(&self, py: Python<'_>) -> PyResult<Session<Criterion>> {
+        self.lock(py)?.session.take().ok_or_else(|| Error::new_err(AWAY))
+    }
+
+    pub(crate) fn is_lent(&self, py: Python<'_>) -> PyResult<bool> {
+        Ok(self.lock(py)?.session.is_none())
+    }
+
+    pub(crate) fn take_back(&self, py: Python<'_>, session: Session<Criterion>) -> PyResult<()> {
+        self.lock(py)?.session = Some(session);
+        Ok(())
+    }
+
+    /// The exception that a denoiser has raised, or that of an error.
+    pub(crate) fn raised(&self, error: SessionError) -> PyErr {
+        self.judging.raised().unwrap_or_else(|| error.raise())
+    }
+
+    /// Checks the shape of a whole picture.
+    pub(crate) fn whole<'a>(&self, image: &'a Pixels<'_>) -> PyResult<std::borrow::Cow<'a, [Rgb]>> {
+        let (width, height, pixels) = image.get();
+        if (width, height) != self.size() {
+            let (w, h) = self.size();
+            let message = format!("image has shape ({height}, {width}, 3), and the session ({h}, {w}, 3)");
+            return Err(SizeError::new_err(message));
+        }
+        Ok(pixels)
     }
 
     /// Does something long without the interpreter.
@@ -101,10 +139,11 @@ impl PySession {
     ) -> PyResult<T> {
         not_while_denoising()?;
         let locked = |mut judged: MutexGuard<'_, Judged>| {
-            let session = &mut judged.session;
-            pool::run(|| work(session))
+            let session = judged.session.as_mut()?;
+            Some(pool::run(|| work(session)))
         };
-        py.detach(|| self.judged.lock().map(locked).ok()).ok_or_else(|| Error::new_err(BROKEN))
+        let done = py.detach(|| self.judged.lock().map(locked).map_err(|_| BROKEN));
+        done.map_err(Error::new_err)?.ok_or_else(|| Error::new_err(AWAY))
     }
 
     fn size(&self) -> (usize, usize) {
@@ -112,7 +151,11 @@ impl PySession {
     }
 
     /// Checks the shape of a batch.
-    fn batch<'a>(&self, tile: Tile, mean: &'a Pixels<'_>) -> PyResult<std::borrow::Cow<'a, [Rgb]>> {
+    pub(crate) fn batch<'a>(
+        &self,
+        tile: Tile,
+        mean: &'a Pixels<'_>,
+    ) -> PyResult<std::borrow::Cow<'a, [Rgb]>> {
         let (width, height, pixels) = mean.get();
         if (width, height) != (tile.width, tile.height) {
             let Tile { index, width: w, height: h, .. } = tile;
@@ -195,6 +238,13 @@ impl PySession {
         Ok(self.attached(py)?.open_tiles())
     }
 
+    /// Samples per pixel that the next pass over the whole picture should have, for a renderer of whole frames: what
+    /// one half lacks until the first of the open tiles can be judged. None when all tiles are done.
+    #[getter]
+    fn next_pass(&self, py: Python<'_>) -> PyResult<Option<u64>> {
+        Ok(self.attached(py)?.next_pass())
+    }
+
     /// What the open tiles need next: a list of Request, empty when all are done.
     fn requests(&self, py: Python<'_>) -> PyResult<Vec<PyRequest>> {
         Ok(self.attached(py)?.requests().into_iter().map(PyRequest::from).collect())
@@ -237,7 +287,9 @@ impl PySession {
 
     /// Adds the mean of spp new samples per pixel of the whole picture to every open tile.
     ///
-    /// image: array of shape (height, width, 3), linear radiance.
+    /// image: array of shape (height, width, 3), linear radiance. Those of frameworks for GPUs (DLPack,
+    ///     __cuda_array_interface__: CuPy, PyTorch, JAX, Dr.Jit) are copied from the device once, by the framework, and
+    ///     read where they lie if that is memory of the processor.
     ///
     /// Raises SizeError if the shape is another, BatchError if spp is 0.
     fn push_image(
@@ -246,13 +298,11 @@ impl PySession {
         #[pyo3(from_py_with = whole)] spp: u64,
         image: Pixels<'_>,
     ) -> PyResult<()> {
-        let (width, height, pixels) = image.get();
-        if (width, height) != self.size() {
-            let (w, h) = self.size();
-            let message = format!("image has shape ({height}, {width}, 3), and the session ({h}, {w}, 3)");
-            return Err(SizeError::new_err(message));
-        }
-        self.attached(py)?.push_image(spp, &pixels).map_err(Raise::raise)
+        let pixels = self.whole(&image)?;
+        let mut session = self.attached(py)?;
+        // The interpreter stays locked: nobody else is to write into what is read
+        let session: &mut Session<Criterion> = &mut session;
+        pool::run(|| session.push_image(spp, &pixels)).map_err(Raise::raise)
     }
 
     /// Judges the tiles that are due, on all cores, and returns a list of Stop: those that are now done.
@@ -269,12 +319,8 @@ impl PySession {
             let stops = session.judge()?;
             Ok((stops, session.new_warnings()))
         };
-        let failed = |error: SessionError| self.judging.raised().unwrap_or_else(|| error.raise());
-        let (stops, warnings) = self.detached(py, judge)?.map_err(failed)?;
-        for warning in warnings {
-            let text = CString::new(warning.to_string()).unwrap_or_default();
-            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
-        }
+        let (stops, warnings) = self.detached(py, judge)?.map_err(|error| self.raised(error))?;
+        warn(py, warnings)?;
         Ok(stops.into_iter().map(PyStop::from).collect())
     }
 
@@ -398,9 +444,9 @@ impl PySession {
         let checkpoint = py.detach(|| Checkpoint::read(BufReader::new(file)));
         let checkpoint = checkpoint.map_err(|error| raise(&path, error))?;
         let mut guard = self.attached(py)?;
-        let judged = fresh(py, self.size(), &self.judging, guard.params().clone(), self.pixels)?;
-        let session = judged.session.resume(job, checkpoint).map_err(|error| raise(&path, error))?;
-        *guard.0 = Judged { session, ..judged };
+        let (session, record) = fresh(py, self.size(), &self.judging, guard.params().clone(), self.pixels)?;
+        let session = session.resume(job, checkpoint).map_err(|error| raise(&path, error))?;
+        *guard.0 = Judged { session: Some(session), record };
         Ok(())
     }
 
@@ -416,11 +462,11 @@ impl PySession {
     ) -> PyResult<Self> {
         let (py, pixels) = (class.py(), noise(shared_pixels));
         let judging = Judging::from_python(judging, size)?;
-        let judged = fresh(py, size, &judging, params.0, pixels)?;
+        let (session, record) = fresh(py, size, &judging, params.0, pixels)?;
         let checkpoint = Checkpoint::read(checkpoint).map_err(Raise::raise)?;
-        let session = judged.session.resume(PICKLED, checkpoint).map_err(Raise::raise)?;
+        let session = session.resume(PICKLED, checkpoint).map_err(Raise::raise)?;
         let grid = session.film().grid();
-        Ok(Self { judged: Mutex::new(Judged { session, ..judged }), judging, grid, pixels })
+        Ok(Self { judged: Mutex::new(Judged { session: Some(session), record }), judging, grid, pixels })
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -455,11 +501,19 @@ fn fresh(
     judging: &Judging,
     params: Params,
     pixels: PixelNoise,
-) -> PyResult<Judged> {
+) -> PyResult<(Session<Criterion>, Option<Arc<Mutex<DenoisedRecord>>>)> {
     let (criterion, record) = judging.make(py)?;
     let mut session = Session::new(width, height, criterion, params).map_err(Raise::raise)?;
     session.set_pixels(pixels);
-    Ok(Judged { session, record })
+    Ok((session, record))
+}
+
+/// Warns of what is likely to be wrong with samples.
+pub(crate) fn warn(py: Python<'_>, warnings: Vec<Warning>) -> PyResult<()> {
+    warnings.into_iter().try_for_each(|warning| {
+        let text = CString::new(warning.to_string()).unwrap_or_default();
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
+    })
 }
 
 fn save(session: &Session<Criterion>, path: &Path, job: &str) -> PyResult<()> {

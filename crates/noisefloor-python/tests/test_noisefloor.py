@@ -242,6 +242,182 @@ class Sessions(unittest.TestCase):
             session.close_all("converged")
 
 
+class Backgrounds(unittest.TestCase):
+    def passes(self, count, spp=16, shape=(80, 96, 3)):
+        for seed in range(count):
+            noise = np.random.default_rng([63, seed]).uniform(-1, 1, shape)
+            yield (0.5 + 0.4 * noise / np.sqrt(spp)).astype(np.float32)
+
+    def test_stops_are_those_of_a_session_that_waits(self):
+        plain, session = nf.Session(96, 80, params=PARAMS), nf.Session(96, 80, params=PARAMS)
+        came = []
+        background = nf.Background(session, waiting=3)
+        for k, image in enumerate(self.passes(26)):
+            plain.push_image(16, image)
+            plain.judge()
+            if k % 2:
+                background.push_image(16, image)
+            else:
+                for index in range(9):
+                    y, x = divmod(index, 3)
+                    height = 16 if y == 2 else EDGE
+                    part = image[y * EDGE:y * EDGE + height, x * EDGE:(x + 1) * EDGE]
+                    background.push(index, 16, part)
+            came += background.judge()
+            image[:] = np.nan  # it was copied
+        came += background.finish()
+        self.assertTrue(plain.done and background.done)
+        self.assertIsNone(background.next_pass)
+        self.assertEqual(background.requests(), [])
+        with self.assertRaisesRegex(nf.Error, r"Background.end\(\)"):
+            session.judge()
+        with self.assertRaisesRegex(nf.Error, r"Background.end\(\)"):
+            nf.Background(session)
+        self.assertIs(background.end(), session)
+        self.assertEqual(stops(session), stops(plain))
+        self.assertEqual(sorted((stop.tile.index, stop.spp) for stop in came),
+                         [(index, spp) for index, spp, _, _ in stops(plain)])
+        # Samples that came after their tile had stopped are in the picture
+        self.assertTrue((session.spp() == 26 * 16).all() and (plain.spp() < 26 * 16).any())
+        with self.assertRaisesRegex(nf.Error, "given back"):
+            background.judge()
+
+    def test_it_ends_with_its_block(self):
+        session = nf.Session(96, 80, params=PARAMS)
+        with nf.Background(session, when_full="merge") as background:
+            for image in self.passes(4):
+                background.push_image(background.next_pass, image)
+                background.judge()
+        self.assertTrue((session.spp() > 0).all())
+        with self.assertRaisesRegex(KeyError, "mine"):
+            with nf.Background(session) as background:
+                raise KeyError("mine")
+        self.assertFalse(session.done)
+        with self.assertRaisesRegex(nf.ParameterError, "when_full"):
+            nf.Background(session, when_full="drop")
+        session.judge()
+
+    def test_errors_come_later(self):
+        session = nf.Session(96, 80, params=PARAMS)
+        background = nf.Background(session)
+        background.push_image(16, np.full((80, 96, 3), np.nan, np.float32))
+        background.judge()
+        with self.assertRaises(nf.FaultError):
+            background.finish()
+        with self.assertRaises(nf.FaultError):
+            background.end()
+        self.assertEqual(session.requests()[0].first, 0)
+
+    def test_a_denoiser_runs_in_the_background_and_its_exceptions_come_back(self):
+        def broken(radiance):
+            raise ZeroDivisionError("no light")
+
+        params = nf.Params(tile=32, schedule="growing", step=48, min_spp=48)
+        for denoiser in (smooth, broken):
+            session = nf.Session(96, 80, params=params, denoiser=denoiser)
+            background = nf.Background(session)
+            for image in self.passes(8):
+                if denoiser is broken:
+                    try:
+                        background.push_image(16, image)
+                        background.judge()
+                    except ZeroDivisionError:
+                        break
+                else:
+                    background.push_image(16, image)
+                    background.judge()
+            if denoiser is smooth:
+                background.finish()
+                self.assertIsNotNone(background.end().jods_lost())
+            else:
+                with self.assertRaises(nf.Error):
+                    background.finish()
+                del background  # while its thread may wait for the interpreter
+
+    @unittest.skipUnless(hasattr(os, "fork"), "no fork")
+    def test_a_process_that_was_forked_off_is_refused(self):
+        background = nf.Background(nf.Session(96, 80, params=PARAMS))
+        reader, writer = os.pipe()
+        child = os.fork()
+        if child == 0:
+            try:
+                background.judge()
+                said = b"nothing"
+            except nf.Error as error:
+                said = str(error).encode()
+            os.write(writer, said)
+            os._exit(0)
+        os.close(writer)
+        self.assertIn("forked", os.read(reader, 1000).decode())
+        os.waitpid(child, 0)
+        background.end()
+
+
+class OnDevices(unittest.TestCase):
+    """Arrays as frameworks for GPUs have them. What they hold lies here, as no device is needed to say so."""
+
+    IMAGE = np.random.default_rng(63).uniform(0.1, 1, (32, 48, 3)).astype(np.float32)
+
+    def pushed(self, array):
+        session = nf.Session(48, 32, params=nf.Params(tile=16))
+        session.push_image(8, array)
+        return session.image()
+
+    def test_arrays_in_memory_are_read_where_they_lie(self):
+        class Readable:
+            def __init__(self, device):
+                self.device = device
+
+            def __dlpack_device__(self):
+                return (self.device, 0)
+
+            def __dlpack__(self, **options):
+                return OnDevices.IMAGE.__dlpack__()
+
+        for device in (1, 3):  # the processor's, and what CUDA has pinned: numpy of today knows the first
+            with self.subTest(device=device):
+                if device == 3:
+                    Readable.__array__ = lambda self, *a, **k: OnDevices.IMAGE
+                np.testing.assert_array_equal(self.pushed(Readable(device)), self.IMAGE)
+
+    def test_arrays_on_a_device_are_copied_as_their_framework_does(self):
+        class Device:
+            """Refuses what numpy tries, as CuPy and PyTorch do."""
+
+            def __array__(self, *arguments, **options):
+                raise TypeError("implicit conversion to a NumPy array is not allowed")
+
+            def __dlpack_device__(self):
+                return (2, 0)
+
+        class CuPy(Device):
+            __cuda_array_interface__ = {"shape": (32, 48, 3), "typestr": "<f4", "data": (64, True), "version": 3}
+
+            def get(self):
+                return OnDevices.IMAGE
+
+        class Torch(Device):
+            def cpu(self):
+                return OnDevices.IMAGE
+
+        class DrJit:
+            __cuda_array_interface__ = CuPy.__cuda_array_interface__
+
+            def __array__(self, *arguments, **options):
+                return OnDevices.IMAGE
+
+        for kind in (CuPy, Torch, DrJit):
+            with self.subTest(kind=kind.__name__):
+                np.testing.assert_array_equal(self.pushed(kind()), self.IMAGE)
+
+        class Broken(CuPy):
+            def get(self):
+                raise RuntimeError("out of memory")
+
+        with self.assertRaisesRegex(nf.SizeError, "out of memory"):
+            self.pushed(Broken())
+
+
 class Faults(unittest.TestCase):
     """Wrong samples are an error or a warning."""
 

@@ -19,6 +19,7 @@ be pickled, so that other processes can render. Every error is a noisefloor.Erro
 """
 
 from ._noisefloor import (
+    Background,
     BatchError,
     CheckpointError,
     CriterionError,
@@ -56,6 +57,7 @@ from ._noisefloor import (
 )
 
 __all__ = [
+    "Background",
     "BatchError",
     "CheckpointError",
     "CriterionError",
