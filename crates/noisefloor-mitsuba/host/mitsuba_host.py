@@ -17,6 +17,8 @@ BLOCK = 16
 PATHS, FIRST_HITS, WRAPPERS = ("path", "volpath", "volpathmis"), ("direct", "depth"), ("aov", "moment", "stokes")
 # Increment and multipliers of SplitMix64 (Steele, Lea and Flood 2014).
 GOLDEN, MIX_1, MIX_2 = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+# Smooth boundaries in a row behind which first hits are looked for.
+BOUNDARIES = 16
 # Divides the seeds of first hits from those of paths.
 APART = 0x6669727374686974
 # Divides the second word of a stream's seed from the first.
@@ -55,7 +57,7 @@ class Mitsuba:
         return self.renderer.sample(tiles)
 
     def first_hits(self, index, samples):
-        """Albedo and shading normals, from passes that are seeded apart. Mitsuba has no albedo for some materials: it is black."""
+        """Albedo and shading normals, from passes that are seeded apart."""
         mi, np, renderer = self.mi, self.np, self.renderer
         film, sensor = renderer.film, renderer.sensor
         crop = mi.traverse(sensor)
@@ -63,7 +65,7 @@ class Mitsuba:
         crop["film.crop_offset"] = [film["x"], film["y"]]
         crop.update()
         if self.aov is None:
-            self.aov = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
+            self.aov = renderer.first_hits()
         most = max(1, LANES // (film["width"] * film["height"]))
         total, done = 0.0, 0
         while done < samples:
@@ -328,6 +330,48 @@ class Wavefront:
         runs = [channel.numpy().reshape(len(x), lanes) for channel in sum]
         return np.stack([run.sum(axis=1, dtype=np.float64) for run in runs], axis=-1)
 
+    def first_hits(self):
+        """An integrator whose last six channels are the albedo and the shading normal of the first surface that scatters, also
+        behind smooth glass and in mirrors: each ray takes one way of a boundary, by what the ways carry. What is no surface has
+        the colour of the surroundings, cut to 1, and no normal."""
+        mi, dr = self.mi, self.dr
+        context, flags = mi.BSDFContext(), mi.BSDFFlags
+
+        class FirstHits(mi.SamplingIntegrator):
+            def aov_names(self):
+                return [f"{name}.{axis}" for name in ("albedo", "normal") for axis in "XYZ"]
+
+            def sample(self, scene, sampler, ray, medium=None, active=True):
+                sky = scene.environment()
+
+                def step(sampler, ray, boundaries, weight, albedo, normal, active):
+                    si = scene.ray_intersect(ray, active)
+                    hit = active & si.is_valid()
+                    if sky is not None:
+                        albedo += dr.select(active & ~hit, weight * dr.clip(sky.eval(si, active & ~hit), 0, 1), 0)
+                    bsdf = si.bsdf(ray)
+                    chosen, carried = bsdf.sample(context, si, sampler.next_1d(hit), sampler.next_2d(hit), hit)
+                    # A mask lets rays pass by its opacity; coats of what scatters are left out
+                    passed = mi.has_flag(chosen.sampled_type, flags.Null)
+                    passed |= mi.has_flag(chosen.sampled_type, flags.Delta) & ~mi.has_flag(bsdf.flags(), flags.Smooth)
+                    passed &= hit & (boundaries < BOUNDARIES)
+                    ends = hit & ~passed
+                    # Of what is not diffuse, what it reflects
+                    colour = dr.select(mi.has_flag(bsdf.flags(), flags.Diffuse), bsdf.eval_diffuse_reflectance(si, ends), carried)
+                    albedo += dr.select(ends, weight * dr.clip(colour, 0, 1), 0)
+                    facing = dr.mulsign(mi.Vector3f(si.sh_frame.n), -dr.dot(ray.d, si.sh_frame.n))
+                    normal += dr.select(ends, facing, 0)
+                    # Radiance is scaled by the square of the index of refraction where it changes; albedo is not
+                    weight *= dr.select(passed, carried * dr.square(chosen.eta), 1)
+                    ray = si.spawn_ray(si.to_world(chosen.wo))
+                    return sampler, ray, boundaries + 1, weight, albedo, normal, passed
+
+                start = (sampler, mi.Ray3f(ray), mi.UInt32(0), mi.Color3f(1), mi.Color3f(0), mi.Vector3f(0), mi.Bool(active))
+                *_, albedo, normal, _ = dr.while_loop(start, lambda *state: state[-1], step)
+                return albedo, mi.Bool(active), [*dr.clip(albedo, 0, 1), *normal]
+
+        return FirstHits(mi.Properties())
+
     def seed_points(self, key, index):
         """Point `index` of the sequence with that key."""
         self.sampler.key, self.sampler.index = key, self.mi.UInt32(index)
@@ -369,6 +413,10 @@ class Scalar:
         self.crop = mi.traverse(sensor)
         self.seed = seed
         self.next_stream = None
+
+    def first_hits(self):
+        """Mitsuba's own integrator for them. It stops at glass and mirrors, whose albedo is black, as that of some other materials."""
+        return self.mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
 
     def sample(self, tiles):
         if self.next_stream is None:
