@@ -1,13 +1,12 @@
 //! Sessions: pushed samples in, stops out.
 
 use crate::border;
-use crate::denoise::{DenoisedBy, NfDenoise};
+use crate::denoise::{DenoisedBy, NfDenoise, guides, passes_of};
 use crate::handle;
 use crate::oracle::NfOracle;
 use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard, not_while_denoising};
 use crate::tone::curve;
-use noisefloor::source::FirstHits;
 use noisefloor::{
     Checkpoint, Oracle, Params, Request, Rgb, Schedule, Session, StoppingCriterion, Tile, TileGrid,
     ToneMapping,
@@ -198,7 +197,8 @@ pub unsafe extern "C" fn nf_session_new(
 /// verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 /// NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 /// NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
-/// independent of each other.
+/// independent of each other; nf_first_hits_are_clean knows whether denoise may take them at their word. passes is 1, or 4 or
+/// 8 if the finished picture is made by nf_mirror_mean.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_new_denoised(
     width: usize,
@@ -208,6 +208,7 @@ pub unsafe extern "C" fn nf_session_new_denoised(
     lost: f64,
     first_hits: *const *const f32,
     floats: usize,
+    passes: u32,
     params: *const NfParams,
     session: *mut *mut NfSession,
 ) -> NfStatus {
@@ -224,25 +225,13 @@ pub unsafe extern "C" fn nf_session_new_denoised(
             unsafe { border::object(params, "params")?.to_params() }?
         };
         TileGrid::new(width, height, params.tile)?;
-        let first_hits = if first_hits.is_null() {
-            None
-        } else {
+        let guides = match first_hits.is_null() {
+            true => None,
             // SAFETY: promised by the caller.
-            let pictures = unsafe { border::array(first_hits, 4, 4, "first_hits") }?;
-            let pixels = |picture: *const f32| -> Result<Vec<Rgb>, Failure> {
-                // SAFETY: promised by the caller.
-                let values = unsafe { border::array(picture, floats, 3 * width * height, "first_hits") }?;
-                if !values.iter().all(|value| value.is_finite()) {
-                    return Err(Failure::new(NfStatus::Argument, "first_hits: a value is not finite"));
-                }
-                Ok(values.as_chunks().0.to_vec())
-            };
-            let half = |albedo, normal| -> Result<FirstHits, Failure> {
-                Ok(FirstHits { width, height, albedo: pixels(albedo)?, normal: pixels(normal)? })
-            };
-            Some(Arc::new([half(pictures[0], pictures[1])?, half(pictures[2], pictures[3])?]))
+            false => Some(Arc::new(unsafe { guides((width, height), first_hits, floats) }?)),
         };
-        let judging = Judging::Denoised(DenoisedBy { denoise, user, lost, first_hits });
+        let passes = passes_of(passes)?;
+        let judging = Judging::Denoised(DenoisedBy { denoise, user, lost, passes, guides });
         // SAFETY: promised by the caller.
         unsafe { handle::give(session, || NfSession::new((width, height), judging, params)) }
     })

@@ -29,9 +29,6 @@ use std::time::Duration;
 const DEFAULT_SCENE: &str = "cornell-box";
 const DEFAULT_SIZE: (usize, usize) = (384, 384);
 const DEFAULT_DEPTH: u32 = 65;
-/// Camera rays a pixel for albedo and normals, of each half: edges are then smoother than in the radiance
-/// of most pictures, for the time of a few samples of it.
-pub const FIRST_HITS_SPP: u64 = 32;
 
 /// Who renders what: all that samples depend on, as a value. Checked; [`SourceJob::open`] finds out the
 /// rest.
@@ -255,6 +252,12 @@ impl SourceJob {
         let options = blake3::hash(&options).to_hex()[..16].to_owned();
         let source = format!("{scene} by {source}");
         Ok(Some(SampleOrigin { source, options, seed: self.seed, repeats }))
+    }
+
+    /// Most camera rays a pixel for albedo and normals, of each half, where they are not clean with fewer. Of the built-in
+    /// renderer, most pixels take far fewer; with other renderers, more would take longer than to clean them.
+    pub fn first_hits_spp(&self) -> u64 {
+        if matches!(self.kind, SourceKind::Ptwne(_)) { 128 } else { 32 }
     }
 
     /// Opens the source.

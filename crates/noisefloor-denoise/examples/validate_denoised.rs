@@ -7,7 +7,7 @@
 #![allow(clippy::print_stdout, reason = "it is what this example is for")]
 
 use noisefloor::{Rgb, Tile, TileGrid, ToneMapping, Viewing, source::FirstHits};
-use noisefloor_denoise::{DenoisedError, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
+use noisefloor_denoise::{DenoisedError, DenoisedHalves, Denoiser, Guides, NoisyPicture, Oidn};
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::FilterPlan;
 use noisefloor_vision::{VisionModel, VisionWorkspace};
@@ -72,9 +72,9 @@ fn validate(folder: &Path, oidn: &mut Oidn) -> Outcome<()> {
     let others = levels(&folder.join("b"))?;
     let mut guides = vec![("", None)];
     if let (Some(a), Some(b)) = (guide(&folder.join("ga"))?, guide(&folder.join("gb"))?) {
-        let (albedo, normal) = (mean(&a.albedo, &b.albedo), mean(&a.normal, &b.normal));
-        let both = FirstHits { width: size.0, height: size.1, albedo, normal };
-        guides.push(("guided-", Some([a, b, both])));
+        let guide = Guides::new([a, b]);
+        let [a, b] = guide.halves().clone();
+        guides.push(("guided-", Some(([a, b, guide.together()], guide.is_clean()))));
     }
     for (half, path) in levels(&folder.join("a"))? {
         let Some((_, other)) = others.iter().find(|(spp, _)| *spp == half) else { continue };
@@ -88,8 +88,11 @@ fn validate(folder: &Path, oidn: &mut Oidn) -> Outcome<()> {
                     return load(&kept);
                 }
                 let picture = NoisyPicture::new(size, noisy);
-                let guide = guides.as_ref().map(|guides| &guides[which]);
-                let made = oidn.denoise(&guide.map_or(picture, |g| picture.guided(g, oidn.wants())))?;
+                let picture = match guides {
+                    Some((guides, clean)) => picture.guided(&guides[which], *clean, oidn.wants()),
+                    None => picture,
+                };
+                let made = oidn.denoise(&picture)?;
                 write_exr(&kept, &RenderLayers::rgb(size.0, size.1, &made))?;
                 Ok(made)
             };

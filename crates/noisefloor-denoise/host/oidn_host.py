@@ -1,8 +1,9 @@
 """Serves Open Image Denoise (the package mitsuba-oidn, which has the library and its weights) to noisefloor-denoise.
 
-Pictures: "radiance", linear and not negative, scaled so that the network sees it as it is; optionally "albedo" in [0, 1], and with it "normal" in [-1, 1]. Runs on the CPU,
-with a number of threads that depends on the size of the picture alone: the last bits of its results depend on it. Processors
-with other instructions may round otherwise, too.
+Pictures: "radiance", linear and not negative, scaled so that the network sees it as it is; optionally "albedo" in [0, 1], and
+with it "normal" in [-1, 1], or "clean albedo" and "clean normal", which have no noise. "albedo" or "normal" alone is denoised
+itself. Runs on the CPU, with a number of threads that depends on the size of the picture alone: the last bits of its results
+depend on it. Processors with other instructions may round otherwise, too.
 """
 
 import os
@@ -15,6 +16,7 @@ import host
 # In small pictures, threads wait for each other more than they compute: there, frames are denoised at once, by one thread each
 SMALL = 512 * 512
 THREADS = 4
+CLEAN = "clean "
 
 
 class Oidn:
@@ -39,27 +41,32 @@ class Oidn:
             return self.np.frombuffer(frame[name], "<f4").reshape(height, width, 3).astype(self.np.float32)
 
         made = self.np.empty((height, width, 3), self.np.float32)
-        filter = self.filter_for(slot, width * height <= SMALL, (width, height, *frame))
-        # Radiance is never negative; rounding may make it so
-        filter.set_image("color", self.np.maximum(array("radiance"), 0.0))
-        for name in frame.keys() & {"albedo", "normal"}:
-            filter.set_image(name, array(name))
+        filter = self.filter_for(slot, (width, height), tuple(frame))
+        for name in frame:
+            if name == "radiance":
+                # It is never negative; rounding may make it so
+                filter.set_image("color", self.np.maximum(array(name), 0.0))
+            else:
+                filter.set_image(name.removeprefix(CLEAN), array(name))
         filter.set_image("output", made)
         filter.execute()
         return made
 
-    def filter_for(self, slot, small, what):
+    def filter_for(self, slot, size, names):
         """The filter of a slot, as it was for the last picture if that was alike: it reads its weights only once."""
         last, filter = self.filters.get(slot, (None, None))
-        if last != what:
+        if last != (size, names):
             device = self.oidn.Device(self.oidn.DeviceType.CPU)
-            device.num_threads = 1 if small else THREADS
+            device.num_threads = 1 if size[0] * size[1] <= SMALL else THREADS
             # Threads that are bound to cores would share them with those of the other frame
             device.set_bool("setAffinity", False)
             device.commit()
             filter = device.new_filter("RT")
-            filter.hdr, filter.quality, filter.input_scale = True, self.oidn.Quality.High, 1.0
-            self.filters[slot] = what, filter
+            filter.quality = self.oidn.Quality.High
+            if "radiance" in names:
+                filter.hdr, filter.input_scale = True, 1.0
+            filter.clean_aux = any(name.startswith(CLEAN) for name in names)
+            self.filters[slot] = (size, names), filter
         return filter
 
 

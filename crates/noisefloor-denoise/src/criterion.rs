@@ -2,6 +2,8 @@
 
 use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture, cut};
 use crate::estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY, PartError};
+use crate::guides::Guides;
+use crate::mirrored::DenoisePasses;
 use crate::parts::{holds, parts_around, whole, within};
 use crate::record::DenoisedRecord;
 use noisefloor::{
@@ -9,7 +11,6 @@ use noisefloor::{
     criterion::{CriterionError, Needs, View},
     display::Display,
     evidence::TilePlanes,
-    source::FirstHits,
 };
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use rayon::prelude::*;
@@ -53,7 +54,8 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 pub struct DenoisedQuality<D> {
     denoiser: D,
     lost: f64,
-    guides: Option<Arc<[FirstHits; 2]>>,
+    guides: Option<Arc<Guides>>,
+    passes: DenoisePasses,
     record: Arc<Mutex<DenoisedRecord>>,
 }
 
@@ -61,14 +63,20 @@ impl<D: Denoiser> DenoisedQuality<D> {
     /// Tiles may lose at most so many JODs, a positive number: 19 of 20 that stop have lost no more, as their estimates
     /// are held to it with a margin, [`ESTIMATE_ERRS_BY`].
     pub fn new(denoiser: D, lost: f64) -> Self {
-        Self { denoiser, lost, guides: None, record: Arc::default() }
+        Self { denoiser, lost, guides: None, passes: DenoisePasses::One, record: Arc::default() }
     }
 
-    /// Helps the denoiser with albedo and normals: one picture for each half of the film, independent of each
-    /// other, from [`ProgressiveSource::first_hits`](noisefloor::ProgressiveSource::first_hits).
+    /// Helps the denoiser with albedo and normals.
     #[must_use]
-    pub fn guided_by(self, guides: Arc<[FirstHits; 2]>) -> Self {
+    pub fn guided_by(self, guides: Arc<Guides>) -> Self {
         Self { guides: Some(guides), ..self }
+    }
+
+    /// Says that the finished picture is a mean of mirror images, a [`MirrorMean`](crate::MirrorMean). Verdicts go by one
+    /// pass, and by what the mean is known to gain, ×0.95.
+    #[must_use]
+    pub fn shown_as_mean_of(self, passes: DenoisePasses) -> Self {
+        Self { passes, ..self }
     }
 
     /// What the verdicts look at: updated by each of them.
@@ -83,8 +91,8 @@ impl<D: Denoiser> DenoisedQuality<D> {
         let wants = self.denoiser.wants();
         let mut pictures = halves.each_ref().map(|half| NoisyPicture::new(size, half));
         if let Some(guides) = &self.guides {
-            let guided = pictures.iter_mut().zip(guides.iter());
-            guided.for_each(|(picture, guide)| *picture = picture.guided(guide, wants));
+            let (guided, clean) = (pictures.iter_mut().zip(guides.halves()), guides.is_clean());
+            guided.for_each(|(picture, guide)| *picture = picture.guided(guide, clean, wants));
         }
         let made =
             self.denoiser.denoise_parts(pictures.each_ref(), parts).map_err(|error| self.failed(&error))?;
@@ -96,7 +104,8 @@ impl<D: Denoiser> DenoisedQuality<D> {
             let [a, b] = halves.each_ref().map(|half| cut(half, size.0, part));
             let size = (part.width, part.height);
             let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [da, db] };
-            Ok((part, DenoisedError::new(&halves, view.display).map_err(|error| self.failed(&error))?))
+            let error = DenoisedError::new(&halves, view.display).map_err(|error| self.failed(&error))?;
+            Ok((part, error.scaled(self.passes.gain())))
         });
         errors.collect()
     }
@@ -127,8 +136,16 @@ fn film_halves(film: &Film) -> [Vec<Rgb>; 2] {
 
 impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
     fn name(&self) -> String {
-        let guided = if self.guides.is_some() { " with albedo and normals" } else { "" };
-        format!("at most {} JOD lost after {}{guided}", self.lost, self.denoiser.name())
+        let guided = match &self.guides {
+            Some(guides) if guides.is_clean() => " with clean albedo and normals",
+            Some(_) => " with albedo and normals",
+            None => "",
+        };
+        let mean = match self.passes.count() {
+            1 => String::new(),
+            count => format!(", mean of {count} mirror images"),
+        };
+        format!("at most {} JOD lost after {}{guided}{mean}", self.lost, self.denoiser.name())
     }
 
     fn fingerprint(&self) -> String {

@@ -17,19 +17,22 @@ pub struct NoisyPicture<'a> {
     pub albedo: Option<&'a [Rgb]>,
     /// Its normal, each component in [−1, 1], as many values.
     pub normal: Option<&'a [Rgb]>,
+    /// Whether albedo and normals have no noise that could be seen: what they show may be taken at its word.
+    pub clean: bool,
 }
 
 impl<'a> NoisyPicture<'a> {
     /// A picture of which only the radiance is known.
     pub fn new(size: (usize, usize), radiance: &'a [Rgb]) -> Self {
-        Self { size, radiance, albedo: None, normal: None }
+        Self { size, radiance, albedo: None, normal: None, clean: false }
     }
 
-    /// The same with those of the first hits that the denoiser makes use of.
+    /// The same with those of the first hits that the denoiser makes use of; whether they are clean,
+    /// [`Guides::is_clean`](crate::Guides::is_clean) knows.
     #[must_use]
-    pub fn guided(self, hits: &'a FirstHits, wants: AuxiliaryPictures) -> Self {
+    pub fn guided(self, hits: &'a FirstHits, clean: bool, wants: AuxiliaryPictures) -> Self {
         let albedo = wants.albedo.then_some(hits.albedo.as_slice());
-        Self { albedo, normal: wants.normal.then_some(hits.normal.as_slice()), ..self }
+        Self { albedo, normal: wants.normal.then_some(hits.normal.as_slice()), clean, ..self }
     }
 
     /// Whether all pictures have as many pixels as the size says.
@@ -85,7 +88,8 @@ pub enum DenoiseError {
 ///   before. A half buffer must not influence how the other one is denoised, or the measured error is too
 ///   small.
 /// - Return as many pixels, linear and finite.
-/// - Use auxiliary pictures only if they are there.
+/// - Use auxiliary pictures only if they are there, and expect noise in them unless they are
+///   [`clean`](NoisyPicture::clean).
 #[auto_impl(&mut, Box)]
 pub trait Denoiser {
     /// Its name and version, and all settings that its results depend on.
@@ -130,6 +134,16 @@ pub trait Denoiser {
         }
         Ok(parts.iter().map(|&part| made.each_ref().map(|made| cut(made, size.0, part))).collect())
     }
+
+    /// Takes the noise out of albedo and normals themselves, so that they are clean; `None` if it cannot, as it says
+    /// unless an implementer knows better.
+    ///
+    /// # Errors
+    /// As for a picture.
+    fn prefilter(&mut self, hits: &FirstHits) -> Result<Option<FirstHits>, DenoiseError> {
+        let _ = hits;
+        Ok(None)
+    }
 }
 
 /// A rectangle of a plane that is `width` pixels wide; of an empty one, nothing.
@@ -164,5 +178,9 @@ impl<D: Denoiser> Denoiser for Arc<Mutex<D>> {
         parts: &[Tile],
     ) -> Result<Vec<[Vec<Rgb>; 2]>, DenoiseError> {
         self.lock().unwrap_or_else(PoisonError::into_inner).denoise_parts(pictures, parts)
+    }
+
+    fn prefilter(&mut self, hits: &FirstHits) -> Result<Option<FirstHits>, DenoiseError> {
+        self.lock().unwrap_or_else(PoisonError::into_inner).prefilter(hits)
     }
 }

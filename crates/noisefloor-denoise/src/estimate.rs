@@ -211,6 +211,12 @@ impl DenoisedError {
         Ok(lost.max(jods_of_edge((level, height), self.size, eyes, room)?))
     }
 
+    /// The same of another strength.
+    pub(crate) fn scaled(mut self, by: f32) -> Self {
+        self.residual.iter_mut().chain(&mut self.standing).for_each(|error| *error *= by);
+        self
+    }
+
     /// A tile of it, alone.
     pub(crate) fn part(&self, tile: Tile) -> Self {
         let width = self.size.0;

@@ -2,6 +2,8 @@
 //!
 //! - [`Denoiser`]: a linear picture in, a picture out; what an implementer promises.
 //! - [`Oidn`]: Open Image Denoise in a process of its own (feature `oidn`).
+//! - [`Guides`]: albedo and normals for both halves, and whether they are clean.
+//! - [`MirrorMean`]: the mean of what a denoiser makes of a picture and of its mirror images.
 //! - [`DenoisedError`]: what is wrong with a denoised picture, from two halves and what becomes of each.
 //! - [`DenoisedQuality`]: a [`noisefloor::StoppingCriterion`] that stops tiles by it, for
 //!   [`noisefloor::Session`] and [`noisefloor::Driver`].
@@ -43,6 +45,8 @@ mod brightness;
 mod criterion;
 mod denoiser;
 mod estimate;
+mod guides;
+mod mirrored;
 #[cfg(feature = "oidn")]
 mod oidn;
 mod parts;
@@ -51,6 +55,8 @@ mod record;
 pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising};
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
 pub use estimate::{DenoisedError, DenoisedExcess, DenoisedHalves, ESTIMATE_ERRS_BY};
+pub use guides::{GuideError, Guides};
+pub use mirrored::{DenoisePasses, MirrorMean};
 #[cfg(feature = "oidn")]
 pub use oidn::{OIDN, Oidn};
 pub use record::DenoisedRecord;

@@ -2,7 +2,7 @@
 
 use crate::denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture, cut};
 use crate::parts::{grown, nearly_all, whole, within};
-use noisefloor::{Rgb, Tile, display::luminance};
+use noisefloor::{Rgb, Tile, display::luminance, source::FirstHits};
 use noisefloor_sidecar::{FilterPlan, PictureFilter, Renderer, SidecarError, find};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -97,9 +97,23 @@ impl Denoiser for Oidn {
         };
         parts.iter().zip(wider).map(both).collect()
     }
+
+    fn prefilter(&mut self, hits: &FirstHits) -> Result<Option<FirstHits>, DenoiseError> {
+        let mut one = |name: &str, plane: &[Rgb]| -> Result<Vec<Rgb>, DenoiseError> {
+            let size = (hits.width, hits.height);
+            let [made] = self.0.apply(size, [&[(name, plane)]]).map_err(|error| self.failed(error))?;
+            Ok(made)
+        };
+        let (albedo, normal) = (one("albedo", &hits.albedo)?, one("normal", &hits.normal)?);
+        Ok(Some(FirstHits { albedo, normal, ..*hits }))
+    }
 }
 
 impl Oidn {
+    fn failed(&self, error: SidecarError) -> DenoiseError {
+        DenoiseError::Failed { name: self.name(), cause: Box::new(error) }
+    }
+
     /// Two pictures of one size, or the same part of both.
     fn both(
         &mut self,
@@ -132,9 +146,10 @@ impl Oidn {
             radiance.as_flattened_mut().iter_mut().for_each(|value| *value *= gains[n]);
             let mut pictures = vec![("radiance", radiance)];
             // Its filter takes normals only beside albedo
+            let names = if all[n].clean { ["clean albedo", "clean normal"] } else { ["albedo", "normal"] };
             if let Some(albedo) = all[n].albedo {
-                pictures.push(("albedo", cut(albedo)));
-                pictures.extend(all[n].normal.map(|normal| ("normal", cut(normal))));
+                pictures.push((names[0], cut(albedo)));
+                pictures.extend(all[n].normal.map(|normal| (names[1], cut(normal))));
             }
             pictures
         });
@@ -142,8 +157,7 @@ impl Oidn {
             pictures.iter().map(|(name, picture)| (*name, picture.as_slice())).collect()
         });
         let made = self.0.apply((part.width, part.height), named.each_ref().map(Vec::as_slice));
-        let mut made =
-            made.map_err(|error| DenoiseError::Failed { name: self.name(), cause: Box::new(error) })?;
+        let mut made = made.map_err(|error| self.failed(error))?;
         for (made, gain) in made.iter_mut().zip(gains) {
             made.as_flattened_mut().iter_mut().for_each(|value| *value /= gain);
         }

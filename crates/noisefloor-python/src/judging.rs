@@ -5,7 +5,8 @@ use crate::errors::{Error, ParameterError, SizeError};
 use crate::oracle::PyOracle;
 use noisefloor::{Oracle, Rgb, Session, StoppingCriterion, source::FirstHits};
 use noisefloor_denoise::{
-    AuxiliaryPictures, DenoiseError, DenoisedQuality, DenoisedRecord, Denoiser, NoisyPicture,
+    AuxiliaryPictures, DenoiseError, DenoisePasses, DenoisedQuality, DenoisedRecord, Denoiser, Guides,
+    MirrorMean, NoisyPicture,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -30,7 +31,9 @@ pub(crate) enum Judging {
         /// Called with arrays, returns an array.
         denoiser: Py<PyAny>,
         lost: f64,
-        first_hits: Option<Arc<[FirstHits; 2]>>,
+        guides: Option<Arc<Guides>>,
+        /// Of the finished picture.
+        passes: DenoisePasses,
         /// What it has raised.
         raised: Arc<Mutex<Option<PyErr>>>,
     },
@@ -42,28 +45,21 @@ pub(crate) type Hits<'py> = [[Pixels<'py>; 2]; 2];
 impl Judging {
     pub(crate) fn denoised(
         denoiser: &Bound<'_, PyAny>,
-        lost: f64,
+        (lost, passes): (f64, usize),
         first_hits: Option<Hits<'_>>,
         size: (usize, usize),
     ) -> PyResult<Self> {
-        if !denoiser.is_callable() {
-            return Err(ParameterError::new_err("denoiser must be a function of a picture"));
-        }
+        must_be_callable(denoiser)?;
         if !(lost > 0.0 && lost.is_finite()) {
             return Err(ParameterError::new_err(format!(
                 "lost must be a positive number of JOD, not {lost}"
             )));
         }
-        let copy = |pixels: &Pixels<'_>| pixels_of(pixels, size, "first_hits");
-        let half = |[albedo, normal]: [Pixels<'_>; 2]| -> PyResult<FirstHits> {
-            let (width, height) = size;
-            Ok(FirstHits { width, height, albedo: copy(&albedo)?, normal: copy(&normal)? })
-        };
-        let pair = |[a, b]: Hits<'_>| -> PyResult<_> { Ok(Arc::new([half(a)?, half(b)?])) };
         Ok(Self::Denoised {
             denoiser: denoiser.clone().unbind(),
             lost,
-            first_hits: first_hits.map(pair).transpose()?,
+            guides: first_hits.map(|hits| guides(hits, size).map(Arc::new)).transpose()?,
+            passes: passes_of(passes)?,
             raised: Arc::default(),
         })
     }
@@ -71,16 +67,16 @@ impl Judging {
     pub(crate) fn make(&self, py: Python<'_>) -> PyResult<(Criterion, Option<Arc<Mutex<DenoisedRecord>>>)> {
         match self {
             Self::Noise(oracle) => Ok((oracle.clone(), None)),
-            Self::Denoised { denoiser, lost, first_hits, raised } => {
+            Self::Denoised { denoiser, lost, guides, passes, raised } => {
                 let function = Function {
                     denoiser: denoiser.clone_ref(py),
                     name: name_of(denoiser.bind(py)),
-                    guided: first_hits.is_some(),
+                    guided: guides.is_some(),
                     raised: Arc::clone(raised),
                 };
-                let mut criterion = DenoisedQuality::new(function, *lost);
-                if let Some(first_hits) = first_hits {
-                    criterion = criterion.guided_by(Arc::clone(first_hits));
+                let mut criterion = DenoisedQuality::new(function, *lost).shown_as_mean_of(*passes);
+                if let Some(guides) = guides {
+                    criterion = criterion.guided_by(Arc::clone(guides));
                 }
                 let record = criterion.record();
                 Ok((Box::new(criterion), Some(record)))
@@ -102,13 +98,13 @@ impl Judging {
     ) -> PyResult<Bound<'py, PyAny>> {
         match self {
             Self::Noise(oracle) => PyOracle((**oracle).clone()).into_bound_py_any(py),
-            Self::Denoised { denoiser, lost, first_hits, .. } => {
+            Self::Denoised { denoiser, lost, guides, passes, .. } => {
                 let half = |hits: &FirstHits| -> PyResult<_> {
                     Ok((picture(py, size, hits.albedo.clone())?, picture(py, size, hits.normal.clone())?))
                 };
-                let hits = first_hits.as_ref();
+                let hits = guides.as_ref().map(|guides| guides.halves());
                 let hits = hits.map(|hits| PyResult::Ok((half(&hits[0])?, half(&hits[1])?))).transpose()?;
-                (denoiser.clone_ref(py), *lost, hits).into_bound_py_any(py)
+                (denoiser.clone_ref(py), (*lost, passes.count()), hits).into_bound_py_any(py)
             }
         }
     }
@@ -117,9 +113,89 @@ impl Judging {
         if let Ok(oracle) = kept.extract::<PyRef<'_, PyOracle>>() {
             return Ok(Self::Noise(Box::new(oracle.0.clone())));
         }
-        let (denoiser, lost, first_hits) = kept.extract::<(Bound<'_, PyAny>, f64, Option<Hits<'_>>)>()?;
-        Self::denoised(&denoiser, lost, first_hits, size)
+        let (denoiser, limits, first_hits) =
+            kept.extract::<(Bound<'_, PyAny>, (f64, usize), Option<Hits<'_>>)>()?;
+        Self::denoised(&denoiser, limits, first_hits, size)
     }
+}
+
+/// Whether a denoiser may take albedo and normals at their word (`cleanAux` of Open Image Denoise): whether the noise by
+/// which both halves differ is too little to be seen in a denoised picture.
+///
+/// first_hits: ((albedo, normal), (albedo, normal)), a pair for each half, independent of each other: arrays of shape
+///     (height, width, 3).
+///
+/// Raises SizeError if the shapes differ, ParameterError if a value is not finite.
+#[pyfunction]
+pub(crate) fn first_hits_are_clean(first_hits: Hits<'_>) -> PyResult<bool> {
+    let (width, height, _) = first_hits[0][0].get();
+    Ok(guides(first_hits, (width, height))?.is_clean())
+}
+
+/// The mean of what a denoiser makes of a picture and of its mirror images: it has less of what denoisers get wrong by
+/// chance. Albedo and normals are mirrored with it.
+///
+/// denoiser: as of a Session. radiance, albedo, normal: arrays of shape (height, width, 3), the last two both or
+///     neither. passes: 1, 4 or 8, with rows for columns.
+///
+/// A Session whose finished picture is such a mean is told so by its `passes`.
+#[pyfunction]
+#[pyo3(signature = (denoiser, radiance, albedo = None, normal = None, *, passes = 4))]
+pub(crate) fn mirror_mean<'py>(
+    py: Python<'py>,
+    denoiser: Bound<'py, PyAny>,
+    radiance: Pixels<'py>,
+    albedo: Option<Pixels<'py>>,
+    normal: Option<Pixels<'py>>,
+    passes: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    must_be_callable(&denoiser)?;
+    if albedo.is_some() != normal.is_some() {
+        return Err(ParameterError::new_err("give both albedo and normal, or neither"));
+    }
+    let (width, height, _) = radiance.get();
+    let size = (width, height);
+    let radiance = pixels_of(&radiance, size, "radiance")?;
+    let plane = |pixels: Option<Pixels<'_>>, what| pixels.map(|p| pixels_of(&p, size, what)).transpose();
+    let (albedo, normal) = (plane(albedo, "albedo")?, plane(normal, "normal")?);
+    let raised = Arc::default();
+    let function = Function {
+        name: name_of(&denoiser),
+        denoiser: denoiser.unbind(),
+        guided: albedo.is_some(),
+        raised: Arc::clone(&raised),
+    };
+    let noisy = NoisyPicture {
+        albedo: albedo.as_deref(),
+        normal: normal.as_deref(),
+        ..NoisyPicture::new(size, &radiance)
+    };
+    let made = MirrorMean::new(function, passes_of(passes)?).denoise(&noisy).map_err(|error| {
+        let raised: Option<PyErr> = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
+        raised.unwrap_or_else(|| Error::new_err(error.to_string()))
+    })?;
+    picture(py, size, made)?.into_bound_py_any(py)
+}
+
+fn must_be_callable(denoiser: &Bound<'_, PyAny>) -> PyResult<()> {
+    if denoiser.is_callable() {
+        Ok(())
+    } else {
+        Err(ParameterError::new_err("denoiser must be a function of a picture"))
+    }
+}
+
+fn passes_of(count: usize) -> PyResult<DenoisePasses> {
+    DenoisePasses::new(count)
+        .ok_or_else(|| ParameterError::new_err(format!("passes must be 1, 4 or 8, not {count}")))
+}
+
+fn guides([a, b]: Hits<'_>, size: (usize, usize)) -> PyResult<Guides> {
+    let half = |[albedo, normal]: [Pixels<'_>; 2]| -> PyResult<FirstHits> {
+        let copy = |pixels| pixels_of(&pixels, size, "first_hits");
+        Ok(FirstHits { width: size.0, height: size.1, albedo: copy(albedo)?, normal: copy(normal)? })
+    };
+    Ok(Guides::new([half(a)?, half(b)?]))
 }
 
 fn name_of(function: &Bound<'_, PyAny>) -> String {

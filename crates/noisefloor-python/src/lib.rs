@@ -51,6 +51,8 @@ mod _noisefloor {
     #[pymodule_export]
     use crate::files::{read, write};
     #[pymodule_export]
+    use crate::judging::{first_hits_are_clean, mirror_mean};
+    #[pymodule_export]
     use crate::metrics::{PyMetrics, metrics};
     #[pymodule_export]
     use crate::oracle::PyOracle;

@@ -40,7 +40,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 ///     Params(schedule="growing", step=48, min_spp=48) unless given. What it returns must hang on its arguments
 ///     alone. It takes the place of oracle, and cannot use sessions.
 /// first_hits: ((albedo, normal), (albedo, normal)), a pair for each half, independent of each other: arrays of shape
-///     (height, width, 3). The denoiser is then called with (radiance, albedo, normal).
+///     (height, width, 3). The denoiser is then called with (radiance, albedo, normal); first_hits_are_clean knows whether it may take
+///     them at their word.
+/// passes: 4 or 8 if the finished picture is the mean of so many mirror images (mirror_mean). Verdicts take one.
 ///
 /// Threads may call any method at any time; calls take turns. The interpreter's lock is released while
 /// judging. A copy, or what pickle makes of a session elsewhere, is one that was saved and resumed: tiles that
@@ -181,7 +183,7 @@ impl PySession {
 impl PySession {
     #[new]
     #[pyo3(signature = (width, height, oracle = None, params = None, shared_pixels = false, *, denoiser = None,
-        lost = DEFAULT_JODS_LOST, first_hits = None))]
+        lost = DEFAULT_JODS_LOST, first_hits = None, passes = 1))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         py: Python<'_>,
@@ -193,6 +195,7 @@ impl PySession {
         denoiser: Option<Bound<'_, PyAny>>,
         lost: f64,
         first_hits: Option<Hits<'_>>,
+        passes: usize,
     ) -> PyResult<Self> {
         let (judging, default) = match (denoiser, oracle) {
             (Some(_), Some(_)) => {
@@ -207,7 +210,7 @@ impl PySession {
             }
             (Some(denoiser), None) => {
                 let seldom = Params::default().with_schedule(Schedule::Growing { step: 48 }).with_min_spp(48);
-                (Judging::denoised(&denoiser, lost, first_hits, (width, height))?, seldom)
+                (Judging::denoised(&denoiser, (lost, passes), first_hits, (width, height))?, seldom)
             }
         };
         let params = params.map_or(default, |params| params.0);

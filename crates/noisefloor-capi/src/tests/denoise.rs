@@ -3,7 +3,9 @@
 use super::*;
 use crate::denoise::*;
 use noisefloor::Schedule;
-use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
+use noisefloor_denoise::{
+    DEFAULT_JODS_LOST, DenoiseError, DenoisePasses, DenoisedQuality, Denoiser, MirrorMean, NoisyPicture,
+};
 use std::cell::{Cell, RefCell};
 
 /// Half of the difference from the mean of its row is taken from each pixel: the picture of `render` is a wall.
@@ -95,6 +97,7 @@ fn denoised_session(told: &Told, hits: Option<&[Vec<f32>; 4]>) -> Handle {
             DEFAULT_JODS_LOST,
             first_hits,
             3 * PIXELS,
+            1,
             &seldom(),
             &mut session,
         )
@@ -212,7 +215,7 @@ fn what_a_denoiser_does_wrong_is_a_status() {
         let hits = if hits.is_empty() { null() } else { hits.as_ptr() };
         // SAFETY: arrays of the sizes given.
         unsafe {
-            nf_session_new_denoised(WIDTH, HEIGHT, denoise, user, lost, hits, floats, null(), &mut session)
+            nf_session_new_denoised(WIDTH, HEIGHT, denoise, user, lost, hits, floats, 1, null(), &mut session)
         }
     };
     assert_eq!(make(None, 0.3, &[], 0), NfStatus::NullPointer);
@@ -234,4 +237,66 @@ fn what_a_denoiser_does_wrong_is_a_status() {
 
 fn noisy_tiles(session: &Handle) -> usize {
     nf_session_tile_count(session.0)
+}
+
+/// The mean of four passes is that of Rust, albedo and normals go with the picture, and mistakes are told.
+#[test]
+fn the_mean_of_mirror_images_is_that_of_rust() {
+    let noisy: Vec<f32> = (0..3 * PIXELS).map(|i| (i * 37 % 101) as f32 / 101.0).collect();
+    let mut expected = MirrorMean::new(Rows, DenoisePasses::Four);
+    let expected = expected.denoise(&NoisyPicture::new((WIDTH, HEIGHT), noisy.as_chunks().0)).unwrap();
+
+    let told = Told::default();
+    let mean = |passes, albedo: *const f32, normal: *const f32, floats, made: &mut Vec<f32>| {
+        let user = std::ptr::from_ref(&told).cast_mut().cast();
+        let (noisy, made) = (noisy.as_ptr(), made.as_mut_ptr());
+        // SAFETY: arrays of at least the size given, and a function of the right kind.
+        unsafe {
+            nf_mirror_mean(WIDTH, HEIGHT, Some(denoise), user, passes, noisy, albedo, normal, made, floats)
+        }
+    };
+    let mut made = vec![0.0; 3 * PIXELS];
+    assert_eq!(mean(4, null(), null(), 3 * PIXELS, &mut made), NfStatus::Ok, "{}", message());
+    assert!(made == expected.as_flattened());
+    assert!(told.calls.get() == 4 && told.hits.borrow().is_empty());
+
+    // The first pixel that a pass sees is another corner each time
+    let plane = |add: usize| -> Vec<f32> { (0..3 * PIXELS).map(|i| (i / 3 + add) as f32).collect() };
+    let (albedo, normal) = (plane(0), plane(1000));
+    assert_eq!(mean(4, albedo.as_ptr(), normal.as_ptr(), 3 * PIXELS, &mut made), NfStatus::Ok);
+    let corners = [0, WIDTH - 1, PIXELS - WIDTH, PIXELS - 1];
+    assert_eq!(*told.hits.borrow(), corners.map(|corner| [corner as f32, (corner + 1000) as f32]));
+
+    assert_eq!(mean(3, null(), null(), 3 * PIXELS, &mut made), NfStatus::Argument);
+    assert!(message().contains("1, 4 or 8"), "{}", message());
+    assert_eq!(mean(4, null(), null(), 3 * PIXELS - 3, &mut made), NfStatus::Size);
+    let fails = Told { returns: 3, ..Told::default() };
+    let user = std::ptr::from_ref(&fails).cast_mut().cast();
+    let (noisy, made) = (noisy.as_ptr(), made.as_mut_ptr());
+    // SAFETY: as above.
+    let status = unsafe {
+        nf_mirror_mean(WIDTH, HEIGHT, Some(denoise), user, 8, noisy, null(), null(), made, 3 * PIXELS)
+    };
+    assert_eq!(status, NfStatus::Criterion);
+    assert!(message().contains("it returned 3"), "{}", message());
+}
+
+#[test]
+fn first_hits_are_clean_where_both_halves_agree() {
+    let plane = |noise: f32| -> Vec<f32> {
+        (0..3 * PIXELS).map(|i| 0.5 + if i % 2 == 0 { noise } else { -noise }).collect()
+    };
+    let clean = |pictures: [&Vec<f32>; 4], floats| {
+        let (pictures, mut clean) = (pictures.map(|picture| picture.as_ptr()), false);
+        // SAFETY: arrays of at least the size given.
+        let status = unsafe { nf_first_hits_are_clean(WIDTH, HEIGHT, pictures.as_ptr(), floats, &mut clean) };
+        (status, clean)
+    };
+    let (plain, noisy) = (plane(0.0), plane(0.3));
+    assert_eq!(clean([&plain; 4], 3 * PIXELS), (NfStatus::Ok, true));
+    // What both share is no noise
+    assert_eq!(clean([&noisy; 4], 3 * PIXELS), (NfStatus::Ok, true));
+    assert_eq!(clean([&plain, &plain, &plain, &noisy], 3 * PIXELS), (NfStatus::Ok, false));
+    assert_eq!(clean([&noisy, &plain, &plain, &plain], 3 * PIXELS), (NfStatus::Ok, false));
+    assert_eq!(clean([&plain; 4], 3 * PIXELS - 1).0, NfStatus::Size);
 }

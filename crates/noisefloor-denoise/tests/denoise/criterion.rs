@@ -7,8 +7,8 @@ use noisefloor::{
     source::FirstHits,
 };
 use noisefloor_denoise::{
-    AuxiliaryPictures, DenoiseError, DenoisedError, DenoisedQuality, Denoiser, ESTIMATE_ERRS_BY,
-    NoisyPicture, spp_with_denoising, spp_without_denoising,
+    AuxiliaryPictures, DenoiseError, DenoisePasses, DenoisedError, DenoisedQuality, Denoiser,
+    ESTIMATE_ERRS_BY, Guides, NoisyPicture, spp_with_denoising, spp_without_denoising,
 };
 use noisefloor_testkit::Noise;
 use noisefloor_vision::{VisionModel, VisionWorkspace};
@@ -285,12 +285,32 @@ fn halves_have_guides_of_their_own() {
         let pixels = |value: f32| vec![[value; 3]; width * height];
         FirstHits { width, height, albedo: pixels(albedo), normal: pixels(0.5) }
     };
-    let guided = plain.guided_by(Arc::new([hits(0.25), hits(0.75)]));
+    let guided = plain.guided_by(Arc::new(Guides::new([hits(0.25), hits(0.75)])));
     assert_ne!(guided.fingerprint(), before);
     let params = Params::default().with_tile(64).with_max_spp(200);
     run(&mut Session::new(SIZE.0, SIZE.1, guided, params).unwrap()).unwrap();
     let seen = seen.lock().unwrap();
     assert!(!seen.is_empty() && seen.chunks(2).all(|two| two == [Some(0.25), Some(0.75)]), "{seen:?}");
+}
+
+/// A finished picture that is a mean of mirror images has less wrong with it: what each tile has lost falls,
+/// and a render with other passes is another one.
+#[test]
+fn verdicts_know_what_the_mean_of_mirror_images_gains() {
+    let judged = |passes| {
+        let criterion = DenoisedQuality::new(Simple::Bilateral(0.3), 5.0).shown_as_mean_of(passes);
+        let (name, record) = (criterion.fingerprint(), criterion.record());
+        let params = Params::default().with_tile(64).with_max_spp(64).with_min_spp(64);
+        run(&mut Session::new(SIZE.0, SIZE.1, criterion, params).unwrap()).unwrap();
+        let lost = record.lock().unwrap().jods_lost.clone();
+        (name, lost)
+    };
+    let ((one, alone), (four, mean)) = (judged(DenoisePasses::One), judged(DenoisePasses::Four));
+    assert_ne!(one, four);
+    for (alone, mean) in alone.iter().zip(&mean) {
+        // JODs are nearly in proportion to a small error
+        assert!((0.9..0.97).contains(&(mean / alone)), "{mean} of {alone}");
+    }
 }
 
 /// Notes the parts that it is asked for, and sees all of the picture.

@@ -5,8 +5,12 @@
 mod criterion;
 /// The estimate, against truths that are known.
 mod estimate;
+/// Albedo and normals of halves.
+mod guides;
 /// Synthetic scenes and simple denoisers.
 mod kit;
+/// Mirror images, and their mean.
+mod mirrored;
 /// Open Image Denoise itself, where it is installed.
 #[cfg(feature = "oidn")]
 mod oidn;

@@ -50,8 +50,10 @@ from ._noisefloor import (
     check,
     excess,
     eyes,
+    first_hits_are_clean,
     judge,
     metrics,
+    mirror_mean,
     read,
     write,
 )
@@ -87,8 +89,10 @@ __all__ = [
     "check",
     "excess",
     "eyes",
+    "first_hits_are_clean",
     "judge",
     "metrics",
+    "mirror_mean",
     "read",
     "write",
 ]

@@ -212,6 +212,7 @@ class Session:
         denoiser: Callable[..., ArrayLike] | None = None,
         lost: float = 0.3,
         first_hits: Sequence[Sequence[ArrayLike]] | None = None,
+        passes: Literal[1, 4, 8] = 1,
     ) -> Session: ...
     @property
     def width(self) -> int: ...
@@ -248,6 +249,15 @@ class Session:
     def save(self, path: str | os.PathLike[str], job: str) -> None: ...
     def resume(self, path: str | os.PathLike[str], job: str) -> None: ...
 
+def first_hits_are_clean(first_hits: Sequence[Sequence[ArrayLike]]) -> bool: ...
+def mirror_mean(
+    denoiser: Callable[..., ArrayLike],
+    radiance: ArrayLike,
+    albedo: ArrayLike | None = None,
+    normal: ArrayLike | None = None,
+    *,
+    passes: Literal[1, 4, 8] = 4,
+) -> NDArray[np.float32]: ...
 @final
 class Background:
     def __new__(

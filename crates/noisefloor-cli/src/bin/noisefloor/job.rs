@@ -8,6 +8,7 @@ use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::options::viewing::judged_by;
 use noisefloor_cli::sources::{Resources, SourceJob};
 use noisefloor_cli::spell::JobPath;
+use noisefloor_denoise::DenoisePasses;
 use noisefloor_rivals::RivalSpec;
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
@@ -48,6 +49,8 @@ pub enum CriterionJob {
     /// By the picture that Open Image Denoise makes, of which a tile may lose so many JODs.
     Denoised {
         lost: f64,
+        /// Of the finished picture.
+        passes: DenoisePasses,
     },
     Rival(RivalSpec),
 }

@@ -66,8 +66,13 @@ fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
     let reference = against.map(|path| read_reference(path, (*width, *height))).transpose()?;
     let (criterion, denoised) = match (&job.criterion, job.criterion.of(oracle.as_ref())) {
         (_, Some(criterion)) => (criterion, None),
-        (CriterionJob::Denoised { lost }, None) => {
-            let (criterion, denoised) = denoised::begin(&mut source, *lost, resources.timeout)?;
+        (CriterionJob::Denoised { lost, passes }, None) => {
+            let (criterion, denoised) = denoised::begin(
+                &mut source,
+                job.source.first_hits_spp(),
+                (*lost, *passes),
+                resources.timeout,
+            )?;
             (criterion, Some(denoised))
         }
         (_, None) => bail!("no model was read"),

@@ -162,12 +162,12 @@ impl<'a> Tune<'a> {
     fn begin(job: &'a TuneJob) -> anyhow::Result<Self> {
         let mut params = Params::default().with_viewing(job.viewing).with_tile(TILE);
         (params.tone_mapping, params.audience) = (job.tone.load()?, job.audience);
-        let judges = Judges::begin(&job.criterion, params, job.resources.timeout)?;
+        let mut judges = Judges::begin(&job.criterion, params, job.resources.timeout)?;
         let frames: Vec<Option<u32>> = match job.frames.as_slice() {
             [] => vec![None],
             frames => frames.iter().copied().map(Some).collect(),
         };
-        let views = frames.into_iter().map(|frame| View::open(job, frame));
+        let views = frames.into_iter().map(|frame| View::open(job, frame, &mut judges));
         let views: Vec<View> = views.collect::<anyhow::Result<_>>()?;
         let identity: anyhow::Result<_> = views.iter().map(|view| view.identity(job, &judges)).collect();
         let search = Search::new(job.tuning.clone(), views.len(), job.regions);

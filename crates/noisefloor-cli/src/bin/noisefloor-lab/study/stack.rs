@@ -7,8 +7,8 @@ use noisefloor_cli::folder::Folder;
 use noisefloor_cli::say::one_line;
 use noisefloor_cli::say::say;
 use noisefloor_cli::signals::cancel_on_signal;
-use noisefloor_cli::sources::{FIRST_HITS_SPP, Opened, Source};
-use noisefloor_denoise::{Denoiser, NoisyPicture, Oidn};
+use noisefloor_cli::sources::{Opened, Source};
+use noisefloor_denoise::{DenoisePasses, Denoiser, Guides, MirrorMean, NoisyPicture, Oidn};
 use noisefloor_image::LinearImage;
 use noisefloor_image::running_means;
 use noisefloor_sidecar::{FilterPlan, PictureCommand};
@@ -54,7 +54,7 @@ pub(super) fn render(job: &StackJob) -> anyhow::Result<()> {
 }
 
 /// Starts the denoiser, if there is one: what it lacks is found before anything is rendered. It gets albedo
-/// and normals as in `render --denoise`.
+/// and normals as in `render --denoise`, and the picture is the mean of mirror images, as there.
 fn finish<'a>(
     job: &'a StackJob,
     source: &mut dyn Source,
@@ -64,11 +64,16 @@ fn finish<'a>(
         None => Box::new(Ok),
         Some(StackDenoiser::Oidn { timeout }) => {
             let mut oidn = Oidn::start(FilterPlan { timeout: *timeout, ..FilterPlan::default() })?;
-            let (wants, guide) = (oidn.wants(), source.first_hits(0, 2 * FIRST_HITS_SPP)?);
+            let guides = Guides::render(source, &mut oidn, job.source.first_hits_spp())?;
+            let guide = guides.map(|guides| (guides.together(), guides.is_clean()));
+            let (wants, mut mean) = (oidn.wants(), MirrorMean::new(oidn, DenoisePasses::Four));
             Box::new(move |pixels| {
                 let picture = NoisyPicture::new((width, height), &pixels);
-                let guided = guide.as_ref().map_or(picture, |guide| picture.guided(guide, wants));
-                let made = oidn.denoise(&guided);
+                let guided = match &guide {
+                    Some((guide, clean)) => picture.guided(guide, *clean, wants),
+                    None => picture,
+                };
+                let made = mean.denoise(&guided);
                 made.map_err(|error| StudyError::StackRender(one_line(&error.into())))
             })
         }

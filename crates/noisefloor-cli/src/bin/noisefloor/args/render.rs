@@ -281,10 +281,11 @@ impl RenderArgs {
         let audience = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
         let limits = self.verdicts.limits(self.denoise.is_some(), &self.renderer, self.preset, audience)?;
         let criterion = match (self.denoise, self.verdicts.criterion) {
-            (Some(_), _) if self.preset == Some(Preset::Draft) => {
-                CriterionJob::Denoised { lost: self.verdicts.lost.max(DRAFT_LOST) }
+            (Some(_), _) => {
+                let (lost, passes) = (self.verdicts.lost, self.verdicts.denoise_passes);
+                let draft = self.preset == Some(Preset::Draft);
+                CriterionJob::Denoised { lost: if draft { lost.max(DRAFT_LOST) } else { lost }, passes }
             }
-            (Some(_), _) => CriterionJob::Denoised { lost: self.verdicts.lost },
             (None, CriterionChoice::Oracle) => {
                 let OracleArgs { model, people, .. } = self.oracle;
                 let scatter = eyes.as_ref().map(Person::uncertainty);

@@ -5,6 +5,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use noisefloor::{Audience, Params, Schedule};
 use noisefloor_cli::options::{renderer::RendererArgs, values};
 use noisefloor_cli::refuse;
+use noisefloor_denoise::DenoisePasses;
 use noisefloor_rivals::RivalSpec;
 
 /// What stops a tile, and when it is judged.
@@ -31,6 +32,11 @@ pub struct VerdictArgs {
         value_parser = values::jods
     )]
     pub lost: f64,
+    /// With --denoise: the picture that is written is the mean of what the denoiser makes of it and of its mirror
+    /// images, 4 or 8 in all; or, with 1, what it makes of the picture alone. The mean has less of what denoisers get
+    /// wrong by chance; verdicts take that into account.
+    #[arg(long, value_name = "1|4|8", requires = "denoise", default_value = "4", value_parser = passes)]
+    pub denoise_passes: DenoisePasses,
     /// For whom: `observers` (those of the training data), `art-students` (1.8 times the samples), a
     /// factor on samples, or a,b for T' = a T + b [default: see --eyes].
     #[arg(long, value_name = "WHO", value_parser = values::audience)]
@@ -94,6 +100,10 @@ pub enum CriterionChoice {
     Oracle,
     Fixed(u64),
     Rival(RivalSpec),
+}
+
+fn passes(text: &str) -> Result<DenoisePasses, String> {
+    text.parse().ok().and_then(DenoisePasses::new).ok_or_else(|| "expected 1, 4 or 8".into())
 }
 
 fn criterion(text: &str) -> Result<CriterionChoice, String> {

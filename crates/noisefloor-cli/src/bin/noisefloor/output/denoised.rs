@@ -4,7 +4,9 @@
 use super::Output;
 use noisefloor::{Rgb, Session, source::FirstHits};
 use noisefloor_cli::say::{NotSaid, note, say};
-use noisefloor_denoise::{DenoisedRecord, Denoiser, ESTIMATE_ERRS_BY, NoisyPicture, spp_without_denoising};
+use noisefloor_denoise::{
+    DenoisedRecord, Denoiser, ESTIMATE_ERRS_BY, Guides, NoisyPicture, spp_without_denoising,
+};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
 use noisefloor_vision::VisionModel;
@@ -16,8 +18,8 @@ use std::time::Instant;
 /// The denoiser of a render, and what its verdicts looked at.
 pub struct Denoised {
     denoiser: Box<dyn Denoiser>,
-    /// Albedo and normals of both halves together.
-    guide: Option<FirstHits>,
+    /// Albedo and normals of both halves together, and whether they are clean.
+    guide: Option<(FirstHits, bool)>,
     record: Arc<Mutex<DenoisedRecord>>,
     give_up: Arc<AtomicBool>,
     /// JODs that a tile may lose.
@@ -31,8 +33,9 @@ pub struct Denoised {
 #[derive(Serialize)]
 pub(super) struct DenoisedReport {
     denoiser: String,
-    /// Whether the source gave it albedo and normals.
+    /// Whether the source gave it albedo and normals, and whether these are clean.
     guided: bool,
+    clean: bool,
     /// Verdicts, each of two denoisings, and the seconds that they took.
     verdicts: usize,
     seconds: f64,
@@ -52,12 +55,12 @@ impl Denoised {
     /// The denoiser gives a call up once `give_up` is set.
     pub fn new(
         denoiser: impl Denoiser + 'static,
-        guides: Option<&[FirstHits; 2]>,
+        guides: Option<&Guides>,
         record: Arc<Mutex<DenoisedRecord>>,
         give_up: Arc<AtomicBool>,
         lost: f64,
     ) -> Self {
-        let guide = guides.map(together);
+        let guide = guides.map(|guides| (guides.together(), guides.is_clean()));
         Self {
             denoiser: Box::new(denoiser),
             guide,
@@ -93,6 +96,7 @@ impl Denoised {
         DenoisedReport {
             denoiser: self.denoiser.name(),
             guided: self.guide.is_some(),
+            clean: self.guide.as_ref().is_some_and(|(_, clean)| *clean),
             verdicts: record.verdicts,
             seconds: record.seconds,
             picture_seconds: self.picture_seconds,
@@ -101,15 +105,6 @@ impl Denoised {
             spp_without: self.spp_without,
         }
     }
-}
-
-/// The mean of two pictures of first hits.
-fn together([a, b]: &[FirstHits; 2]) -> FirstHits {
-    let mean = |a: &[Rgb], b: &[Rgb]| -> Vec<Rgb> {
-        a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
-    };
-    let (albedo, normal) = (mean(&a.albedo, &b.albedo), mean(&a.normal, &b.normal));
-    FirstHits { width: a.width, height: a.height, albedo, normal }
 }
 
 /// JODs lost, from nothing that people see to what three of four do.
@@ -131,9 +126,11 @@ impl Output {
         let began = Instant::now();
         let (noisy, wants) = (session.film().image(), denoised.denoiser.wants());
         let picture = NoisyPicture::new((width, height), &noisy);
-        let guide = denoised.guide.as_ref();
-        let mut image =
-            denoised.denoiser.denoise(&guide.map_or(picture, |guide| picture.guided(guide, wants)))?;
+        let picture = match &denoised.guide {
+            Some((guide, clean)) => picture.guided(guide, *clean, wants),
+            None => picture,
+        };
+        let mut image = denoised.denoiser.denoise(&picture)?;
         denoised.record().compose(grid, &noisy, &mut image);
         let display = session.display_so_far();
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
@@ -144,7 +141,7 @@ impl Output {
         let eyes = VisionModel::new(&viewing);
         let map = denoised.record().error.as_ref().map(|error| error.map_of_jods_lost(&eyes)).transpose()?;
         write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
-        if let Some(guide) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
+        if let Some((guide, _)) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
             write_exr(self.path("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
             write_exr(self.path("normal.exr"), &RenderLayers::rgb(width, height, &guide.normal))?;
         }
@@ -165,6 +162,7 @@ impl Output {
         let DenoisedReport {
             denoiser,
             guided,
+            clean,
             verdicts,
             seconds,
             picture_seconds,
@@ -178,7 +176,11 @@ impl Output {
             || "out of sight without".to_owned(),
             |spp| format!("about {spp:.0} without, as estimated from the same halves"),
         );
-        let with = if guided { " with albedo and normals" } else { "" };
+        let with = match (guided, clean) {
+            (_, true) => " with clean albedo and normals",
+            (true, false) => " with albedo and normals",
+            (false, false) => "",
+        };
         say!("{spp:.0} spp denoised by {denoiser}{with}; {without}")?;
         if undenoised_tiles > 0 {
             say!(

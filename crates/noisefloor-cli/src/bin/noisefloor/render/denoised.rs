@@ -2,11 +2,10 @@
 
 use crate::job::FIRST_DENOISED;
 use crate::output::Denoised;
-use noisefloor::{ProgressiveSource, Session, SourceError, StoppingCriterion, source::FirstHits};
+use noisefloor::{ProgressiveSource, Session, StoppingCriterion};
 use noisefloor_cli::say::say;
-use noisefloor_cli::sources::FIRST_HITS_SPP;
 use noisefloor_denoise::{
-    AuxiliaryPictures, DEFAULT_JODS_LOST, DenoisedQuality, Denoiser, Oidn, spp_with_denoising,
+    DEFAULT_JODS_LOST, DenoisePasses, DenoisedQuality, Guides, MirrorMean, Oidn, spp_with_denoising,
 };
 use noisefloor_sidecar::FilterPlan;
 use std::sync::atomic::AtomicBool;
@@ -18,22 +17,24 @@ const LONG: Duration = Duration::from_secs(30);
 /// What is saved must be more than the estimate may be wrong by.
 const WORTH_SAYING: f64 = 2.0;
 
-/// Starts the denoiser. A tile may lose so many JODs, and a call may take so long.
+/// Starts the denoiser. First hits take at most so many rays, a tile may lose so many JODs, and a call may take so long.
 pub(super) fn begin(
     source: &mut impl ProgressiveSource,
-    lost: f64,
+    rays: u64,
+    (lost, passes): (f64, DenoisePasses),
     timeout: Duration,
 ) -> anyhow::Result<(Box<dyn StoppingCriterion + Send>, Denoised)> {
     let plan = FilterPlan { timeout, ..FilterPlan::default() };
     let (mut denoiser, give_up) = (Oidn::start(plan)?, Arc::<AtomicBool>::default());
     denoiser.give_up_when(Arc::clone(&give_up));
-    let denoiser = Arc::new(Mutex::new(denoiser));
-    let mut criterion = DenoisedQuality::new(Arc::clone(&denoiser), lost);
-    let guides = guides(source, denoiser.wants())?;
+    let mut denoiser = Arc::new(Mutex::new(denoiser));
+    let mut criterion = DenoisedQuality::new(Arc::clone(&denoiser), lost).shown_as_mean_of(passes);
+    let guides = Guides::render(source, &mut denoiser, rays)?.map(Arc::new);
     if let Some(guides) = &guides {
         criterion = criterion.guided_by(Arc::clone(guides));
     }
-    let denoised = Denoised::new(denoiser, guides.as_deref(), criterion.record(), give_up, lost);
+    let finished = MirrorMean::new(denoiser, passes);
+    let denoised = Denoised::new(finished, guides.as_deref(), criterion.record(), give_up, lost);
     Ok((Box::new(criterion), denoised))
 }
 
@@ -55,16 +56,4 @@ pub(super) fn say_what_it_would_save(session: &Session, took: Duration) -> anyho
         say!("--denoise oidn would have taken about {spp:.0} samples per pixel, {times:.1} times fewer")?;
     }
     Ok(())
-}
-
-/// Albedo and normals for each half, if the denoiser makes use of them and the source has them.
-fn guides(
-    source: &mut impl ProgressiveSource,
-    wants: AuxiliaryPictures,
-) -> Result<Option<Arc<[FirstHits; 2]>>, SourceError> {
-    if !wants.any() {
-        return Ok(None);
-    }
-    let Some(a) = source.first_hits(0, FIRST_HITS_SPP)? else { return Ok(None) };
-    Ok(source.first_hits(1, FIRST_HITS_SPP)?.map(|b| Arc::new([a, b])))
 }

@@ -4,14 +4,16 @@ use super::{TuneCriterion, TuneJob, name};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use noisefloor::display::Display;
-use noisefloor::source::{FirstHits, SourceIdentity};
+use noisefloor::source::SourceIdentity;
 use noisefloor::stills::StillError;
 use noisefloor::tune::{Excess, Knob, PicturePair, most_in_squares};
 use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
-use noisefloor_cli::sources::{FIRST_HITS_SPP, Opened, Resources, Source, SourceJob, SourceKind};
-use noisefloor_denoise::{DenoisedError, DenoisedExcess, DenoisedHalves, Denoiser, NoisyPicture, Oidn};
+use noisefloor_cli::sources::{Opened, Resources, Source, SourceJob, SourceKind};
+use noisefloor_denoise::{
+    DenoisedError, DenoisedExcess, DenoisedHalves, Denoiser, Guides, NoisyPicture, Oidn,
+};
 use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
 use std::fs::File;
 use std::time::Duration;
@@ -79,16 +81,16 @@ pub struct View {
     source: SourceJob,
     pub pictures: Pictures,
     /// Albedo and normals for the denoiser, of each half.
-    pub guides: Option<[FirstHits; 2]>,
+    pub guides: Option<Guides>,
 }
 
 impl View {
-    pub fn open(job: &TuneJob, frame: Option<u32>) -> anyhow::Result<Self> {
+    pub fn open(job: &TuneJob, frame: Option<u32>, judges: &mut Judges<'_>) -> anyhow::Result<Self> {
         let source = frame.map_or_else(|| job.source.clone(), |frame| job.source.of_frame(frame));
         let mut pictures = Pictures::open(&source, job.resources, job.tuning.knob(), job.most_spp)?;
-        let guides = match job.criterion {
-            TuneCriterion::Noise(_) => None,
-            TuneCriterion::Denoised { .. } => pictures.guides()?,
+        let guides = match &mut judges.denoiser {
+            Some(denoiser) => pictures.guides(source.first_hits_spp(), denoiser)?,
+            None => None,
         };
         Ok(Self { frame, source, pictures, guides })
     }
@@ -149,10 +151,9 @@ impl Pictures {
     }
 
     /// Albedo and normals, if the source has them.
-    fn guides(&mut self) -> anyhow::Result<Option<[FirstHits; 2]>> {
+    fn guides(&mut self, rays: u64, denoiser: &mut Oidn) -> anyhow::Result<Option<Guides>> {
         let (Self::Samples { source, .. } | Self::Adaptive { source, .. }) = self else { return Ok(None) };
-        let Some(a) = source.first_hits(0, FIRST_HITS_SPP)? else { return Ok(None) };
-        Ok(source.first_hits(1, FIRST_HITS_SPP)?.map(|b| [a, b]))
+        Ok(Guides::render(source, denoiser, rays)?)
     }
 
     /// Two pictures, or a part of them, each with this setting.
@@ -301,7 +302,7 @@ impl<'a> Judges<'a> {
     pub fn judge(
         &mut self,
         pair: Pair,
-        guides: Option<&[FirstHits; 2]>,
+        guides: Option<&Guides>,
         crop: Option<&Crop>,
     ) -> anyhow::Result<Judged> {
         let Pair { size, pictures, spp } = pair;
@@ -309,15 +310,7 @@ impl<'a> Judges<'a> {
         if let Some(crop) = crop {
             params.tone_mapping = crop.tone.clone();
         }
-        let guides = guides.map(|guides| match crop {
-            None => guides.clone(),
-            Some(Crop { tile, .. }) => guides.each_ref().map(|whole| FirstHits {
-                width: tile.width,
-                height: tile.height,
-                albedo: cut(*tile, whole.width, &whole.albedo),
-                normal: cut(*tile, whole.width, &whole.normal),
-            }),
-        });
+        let guides = guides.map(|guides| crop.map_or_else(|| guides.clone(), |crop| guides.part(crop.tile)));
         // In the whole picture
         let in_whole = |excess: Excess| {
             let (x, y) = crop.map_or((0, 0), |crop| (crop.tile.x, crop.tile.y));
@@ -341,9 +334,16 @@ impl<'a> Judges<'a> {
         match (self.criterion, &mut self.denoiser) {
             (TuneCriterion::Denoised { lost }, Some(denoiser)) => {
                 let wants = denoiser.wants();
-                let guided = |pixels, half: usize| {
+                let (hits, clean) = match &guides {
+                    Some(guides) => {
+                        let [a, b] = guides.halves();
+                        ([Some(a.clone()), Some(b.clone()), Some(guides.together())], guides.is_clean())
+                    }
+                    None => ([None, None, None], false),
+                };
+                let guided = |pixels, of: usize| {
                     let picture = NoisyPicture::new(size, pixels);
-                    guides.as_ref().map_or(picture, |guides| picture.guided(&guides[half], wants))
+                    hits[of].as_ref().map_or(picture, |hits| picture.guided(hits, clean, wants))
                 };
                 let noisy = [pictures[0].as_slice(), &pictures[1]];
                 let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;
@@ -351,7 +351,7 @@ impl<'a> Judges<'a> {
                     DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
                 let DenoisedExcess { worst, squares, map } = error.excess(*lost, &params.viewing)?;
                 let excess = in_whole(halves.tell_apart(worst));
-                let denoised = Some(denoiser.denoise(&guided(&mean, 0))?);
+                let denoised = Some(denoiser.denoise(&guided(&mean, 2))?);
                 Ok(Judged { excess, size, mean, denoised, display, map, squares, spp })
             }
             (TuneCriterion::Noise(oracle), _) => {

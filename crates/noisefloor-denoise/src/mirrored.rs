@@ -1,0 +1,176 @@
+//! The mean of what a denoiser makes of a picture and of its mirror images.
+//!
+//! What a network gets wrong is partly chance: it makes something else of the mirror image, though the picture is the
+//! same. The mean of both has less of that. Whatever the denoiser, the mean is as symmetric as its input: that of a
+//! mirrored picture is the mirrored mean.
+
+use crate::denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
+use noisefloor::{Rgb, source::FirstHits};
+use serde::{Deserialize, Serialize};
+
+/// What is wrong with the mean of four, as a share of what is wrong with one pass.
+const GAIN: f32 = 0.95;
+
+/// How often the finished picture is denoised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum DenoisePasses {
+    /// Once, as it is.
+    #[default]
+    One,
+    /// And mirrored left to right, top to bottom, and both.
+    Four,
+    /// And all of these with rows for columns.
+    Eight,
+}
+
+impl DenoisePasses {
+    /// The number; those there are by [`DenoisePasses::new`].
+    pub fn count(self) -> usize {
+        match self {
+            Self::One => 1,
+            Self::Four => 4,
+            Self::Eight => 8,
+        }
+    }
+
+    /// What is wrong with the mean, as a share of what is wrong with one pass (`docs/denoising.md`).
+    pub(crate) fn gain(self) -> f32 {
+        match self {
+            Self::One => 1.0,
+            Self::Four | Self::Eight => GAIN,
+        }
+    }
+
+    /// One, four or eight; `None` of anything else.
+    pub fn new(count: usize) -> Option<Self> {
+        [Self::One, Self::Four, Self::Eight].into_iter().find(|passes| passes.count() == count)
+    }
+}
+
+/// A denoiser whose pictures are the mean of what another one makes of a picture and of its mirror images.
+#[derive(Debug)]
+pub struct MirrorMean<D> {
+    denoiser: D,
+    passes: DenoisePasses,
+}
+
+impl<D: Denoiser> MirrorMean<D> {
+    /// The mean of so many passes.
+    pub fn new(denoiser: D, passes: DenoisePasses) -> Self {
+        Self { denoiser, passes }
+    }
+}
+
+impl<D: Denoiser> Denoiser for MirrorMean<D> {
+    fn name(&self) -> String {
+        match self.passes.count() {
+            1 => self.denoiser.name(),
+            count => format!("{}, mean of {count} mirror images", self.denoiser.name()),
+        }
+    }
+
+    fn wants(&self) -> AuxiliaryPictures {
+        self.denoiser.wants()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        if self.passes == DenoisePasses::One {
+            return self.denoiser.denoise(picture);
+        }
+        if !picture.fits() {
+            return Err(DenoiseError::Pixels { size: picture.size, got: picture.radiance.len() });
+        }
+        let mut sums = vec![[0.0_f64; 3]; picture.radiance.len()];
+        // In pairs, which a denoiser may be quicker with
+        for first in (0..self.passes.count()).step_by(2) {
+            let images = [Image::new(first, picture.size), Image::new(first + 1, picture.size)];
+            let turned = images.map(|image| Turned::new(picture, image));
+            let made = self.denoiser.denoise_both(turned.each_ref().map(Turned::picture).each_ref())?;
+            for (image, made) in images.into_iter().zip(made) {
+                if made.len() != sums.len() {
+                    return Err(DenoiseError::Pixels { size: image.size(), got: made.len() });
+                }
+                for (place, made) in image.places().zip(made) {
+                    sums[place].iter_mut().zip(made).for_each(|(sum, value)| *sum += f64::from(value));
+                }
+            }
+        }
+        let count = self.passes.count() as f64;
+        Ok(sums.into_iter().map(|sum| sum.map(|sum| (sum / count) as f32)).collect())
+    }
+
+    fn prefilter(&mut self, hits: &FirstHits) -> Result<Option<FirstHits>, DenoiseError> {
+        self.denoiser.prefilter(hits)
+    }
+}
+
+/// One of the eight ways to lay a rectangle on itself, or on itself with rows for columns.
+#[derive(Clone, Copy)]
+struct Image {
+    /// Of the picture.
+    width: usize,
+    height: usize,
+    across: bool,
+    down: bool,
+    transposed: bool,
+}
+
+impl Image {
+    fn new(number: usize, (width, height): (usize, usize)) -> Self {
+        let is = |bit: usize| number & bit != 0;
+        Self { width, height, across: is(1), down: is(2), transposed: is(4) }
+    }
+
+    /// Width and height.
+    fn size(self) -> (usize, usize) {
+        if self.transposed { (self.height, self.width) } else { (self.width, self.height) }
+    }
+
+    /// Where each of its pixels, row by row, lies in the picture.
+    fn places(self) -> impl Iterator<Item = usize> {
+        let (width, height) = self.size();
+        (0..height).flat_map(move |i| (0..width).map(move |j| self.place(j, i)))
+    }
+
+    fn place(self, j: usize, i: usize) -> usize {
+        let (x, y) = if self.transposed { (i, j) } else { (j, i) };
+        let x = if self.across { self.width - 1 - x } else { x };
+        let y = if self.down { self.height - 1 - y } else { y };
+        y * self.width + x
+    }
+}
+
+/// A mirror image of a picture and of what is known of its pixels. Normals are in coordinates of the scene, which
+/// denoisers do not know: they stay as they are.
+struct Turned {
+    size: (usize, usize),
+    radiance: Vec<Rgb>,
+    albedo: Option<Vec<Rgb>>,
+    normal: Option<Vec<Rgb>>,
+    clean: bool,
+}
+
+impl Turned {
+    fn new(picture: &NoisyPicture<'_>, image: Image) -> Self {
+        let turn = |plane: &[Rgb]| -> Vec<Rgb> { image.places().map(|place| plane[place]).collect() };
+        Self {
+            size: image.size(),
+            radiance: turn(picture.radiance),
+            albedo: picture.albedo.map(turn),
+            normal: picture.normal.map(turn),
+            clean: picture.clean,
+        }
+    }
+
+    fn picture(&self) -> NoisyPicture<'_> {
+        NoisyPicture {
+            size: self.size,
+            radiance: &self.radiance,
+            albedo: self.albedo.as_deref(),
+            normal: self.normal.as_deref(),
+            clean: self.clean,
+        }
+    }
+}
