@@ -7,7 +7,8 @@
 use crate::accel::Stack;
 use crate::bsdf::{fresnel, pane, refract};
 use crate::filter::Filter;
-use crate::intersection::{Intersection, OpacityTest};
+use crate::geometry::Intersection;
+use crate::intersection::OpacityTest;
 use crate::material::Bsdf;
 use crate::math::{Ray, Vec3, reflect};
 use crate::rng::{Key, mix};
