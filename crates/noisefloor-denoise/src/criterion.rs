@@ -73,7 +73,7 @@ impl<D: Denoiser> DenoisedQuality<D> {
     }
 
     /// Says that the finished picture is a mean of mirror images, a [`MirrorMean`](crate::MirrorMean). Verdicts go by one
-    /// pass, and by what the mean is known to gain, ×0.95.
+    /// pass, and by what the mean is known to gain, an error of ×0.97.
     #[must_use]
     pub fn shown_as_mean_of(self, passes: DenoisePasses) -> Self {
         Self { passes, ..self }

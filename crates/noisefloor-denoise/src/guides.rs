@@ -26,7 +26,7 @@ impl Guides {
     /// These pictures, from [`ProgressiveSource::first_hits`] for instance. By what they differ in they say whether they are
     /// clean.
     pub fn new(halves: [FirstHits; 2]) -> Self {
-        let clean = noise(&halves) <= CLEAN;
+        let clean = noise(&halves).all(|variance| variance <= CLEAN * CLEAN);
         Self { halves, clean }
     }
 
@@ -116,21 +116,20 @@ pub enum GuideError {
     Denoise(#[from] DenoiseError),
 }
 
-/// Root mean square of the noise of each half, in the noisiest square.
-fn noise([a, b]: &[FirstHits; 2]) -> f64 {
+/// Variance of the noise of each half, square by square; NaN where a value is not finite.
+fn noise([a, b]: &[FirstHits; 2]) -> impl Iterator<Item = f64> {
     let squared = |a: &Rgb, b: &Rgb| -> f64 { a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum() };
     let pixels = a.albedo.iter().zip(&b.albedo).zip(a.normal.iter().zip(&b.normal));
     // The difference of two pictures has twice the variance of one; values of each pixel are six
     let variance: Vec<f64> =
         pixels.map(|((a, b), (na, nb))| (squared(a, b) + squared(na, nb)) / 12.0).collect();
-    let places = |side: usize| {
-        (0..side.div_ceil(SQUARE))
-            .map(move |n| (n * side / side.div_ceil(SQUARE), (n + 1) * side / side.div_ceil(SQUARE)))
-    };
-    let mean = |((top, bottom), (left, right)): ((usize, usize), (usize, usize))| {
-        let rows = (top..bottom).filter_map(|y| variance.get(y * a.width + left..y * a.width + right));
+    let (width, height) = (a.width, a.height);
+    let edge = |n: usize, side: usize| n * side / side.div_ceil(SQUARE);
+    let places =
+        move |side: usize| (0..side.div_ceil(SQUARE)).map(move |n| (edge(n, side), edge(n + 1, side)));
+    let squares = places(height).flat_map(move |rows| places(width).map(move |columns| (rows, columns)));
+    squares.map(move |((top, bottom), (left, right))| {
+        let rows = (top..bottom).filter_map(|y| variance.get(y * width + left..y * width + right));
         rows.flatten().sum::<f64>() / ((bottom - top) * (right - left)) as f64
-    };
-    let squares = places(a.height).flat_map(|rows| places(a.width).map(move |columns| (rows, columns)));
-    squares.map(mean).fold(0.0, f64::max).sqrt()
+    })
 }

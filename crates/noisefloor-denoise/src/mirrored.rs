@@ -8,8 +8,9 @@ use crate::denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
 use noisefloor::{Rgb, source::FirstHits};
 use serde::{Deserialize, Serialize};
 
-/// What is wrong with the mean of four, as a share of what is wrong with one pass.
-const GAIN: f32 = 0.95;
+/// How strong the error of the mean of four is beside that of one pass: 3 to 6 % fewer JODs are lost, where 2 to 8 % were
+/// found.
+const GAIN: f32 = 0.97;
 
 /// How often the finished picture is denoised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

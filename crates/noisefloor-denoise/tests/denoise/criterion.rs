@@ -308,8 +308,8 @@ fn verdicts_know_what_the_mean_of_mirror_images_gains() {
     let ((one, alone), (four, mean)) = (judged(DenoisePasses::One), judged(DenoisePasses::Four));
     assert_ne!(one, four);
     for (alone, mean) in alone.iter().zip(&mean) {
-        // JODs are nearly in proportion to a small error
-        assert!((0.9..0.97).contains(&(mean / alone)), "{mean} of {alone}");
+        // An error of ×0.97 loses ×0.94 of JODs if it is small, ×0.97 if it is large
+        assert!((0.93..0.975).contains(&(mean / alone)), "{mean} of {alone}");
     }
 }
 

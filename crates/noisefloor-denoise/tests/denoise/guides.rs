@@ -31,6 +31,10 @@ fn they_are_clean_if_the_noisiest_square_is() {
     assert!(clean(0.0, |_, _| true) && clean(0.0185, |_, _| true) && !clean(0.0215, |_, _| true));
     // In one corner only: the picture on average has less
     assert!(!clean(0.0215, |x, y| x >= 100 && y >= 35) && clean(0.0185, |x, y| x >= 100 && y >= 35));
+    // What is no number is not clean
+    let mut odd = hits(1, 0.0, |_, _| true);
+    odd.normal[7][2] = f32::NAN;
+    assert!(!Guides::new([odd.clone(), odd]).is_clean());
     // Edges are few pixels
     assert!(clean(0.1, |x, _| x == 20) && !clean(0.3, |x, _| x == 20));
 }
