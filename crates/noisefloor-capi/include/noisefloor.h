@@ -339,7 +339,8 @@ NfStatus nf_session_new(size_t width,
 // verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 // NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 // NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
-// independent of each other.
+// independent of each other; nf_first_hits_are_clean knows whether denoise may take them at their word. passes is 1, or 4 or
+// 8 if the finished picture is made by nf_mirror_mean.
 NfStatus nf_session_new_denoised(size_t width,
                                  size_t height,
                                  NfDenoise denoise,
@@ -347,6 +348,7 @@ NfStatus nf_session_new_denoised(size_t width,
                                  double lost,
                                  const float *const *first_hits,
                                  size_t floats,
+                                 uint32_t passes,
                                  const NfParams *params,
                                  NfSession **session);
 
@@ -405,6 +407,28 @@ NfStatus nf_session_jods_lost(const NfSession *session,
 NfStatus nf_session_undenoised(const NfSession *session,
                                bool *undenoised,
                                size_t capacity);
+
+// Whether a denoiser may take albedo and normals at their word (cleanAux of Open Image Denoise): whether the noise by which
+// both halves differ is too little to be seen in a denoised picture. first_hits as in nf_session_new_denoised.
+NfStatus nf_first_hits_are_clean(size_t width,
+                                 size_t height,
+                                 const float *const *first_hits,
+                                 size_t floats,
+                                 bool *clean);
+
+// Writes into denoised the mean of what denoise makes of a picture and of its mirror images: it has less of what denoisers get
+// wrong by chance. albedo and normal are NULL, or mirrored with it. All pictures have floats floats, 3 * width * height.
+// passes is 1, 4, or 8, with rows for columns: width and height that denoise is told are then exchanged.
+NfStatus nf_mirror_mean(size_t width,
+                        size_t height,
+                        NfDenoise denoise,
+                        void *user,
+                        uint32_t passes,
+                        const float *noisy,
+                        const float *albedo,
+                        const float *normal,
+                        float *denoised,
+                        size_t floats);
 
 // A .cube file: a 1D LUT, a 3D LUT, or a 1D one before a 3D one. text is its content, bytes long. input says how
 // radiance is encoded before it: "linear" (also NULL), "srgb", "acescct", or "log2:LOW,HIGH" for stops from middle grey
