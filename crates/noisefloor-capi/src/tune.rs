@@ -190,7 +190,7 @@ pub unsafe extern "C" fn nf_excess_denoised(
         let pair = PicturePair::new(size, [a.clone(), b.clone()], UNKNOWN_SPP).map_err(unfit)?;
         let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
         let wrong = |error: &dyn std::error::Error| Failure::new(NfStatus::Size, error.to_string());
-        let compared = pair.compare(&params).map_err(unfit)?;
+        let compared = pair.compare(&params);
         let error = DenoisedError::new(&halves, compared.display()).map_err(|error| wrong(&error))?;
         let found = error.excess(lost, &params.viewing).map_err(|error| wrong(&error))?.worst;
         // SAFETY: promised by the caller.

@@ -27,7 +27,7 @@ use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::{DenoiseError, cut};
 use crate::parts::within;
 use noisefloor::tune::{Excess, squares};
-use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes};
+use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes, internal::held};
 use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 
@@ -84,9 +84,9 @@ pub struct DenoisedExcess {
     pub map: Vec<f32>,
 }
 
-/// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves,
-/// and the residuals of both halves.
-type Displayed = [f32; 4];
+/// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves, what a white
+/// dot of one half adds to the mean, and the residuals of both halves.
+type Displayed = [f32; 5];
 
 impl DenoisedError {
     /// Estimates the error of the picture that is denoised from all samples of both halves.
@@ -107,11 +107,18 @@ impl DenoisedError {
             .map(|i| displayed(display, noisy.map(|p| p[i]), denoised.map(|p| p[i])))
             .collect();
         let plane = |n: usize| Plane::new(size, all.iter().map(|pixel| pixel[n]).collect());
-        let (mut residual, mut standing) = (plane(1).values, vec![0.0; all.len()]);
-        add_common([&mut residual, &mut standing], [plane(2), plane(3)]);
+        let mut residual = plane(1).values;
+        settle_sign(&mut residual);
+        // Nothing is added to what is white already: the picture is shown without it
+        let without = |(pixel, &residual): (&Displayed, &f32)| {
+            if residual > 0.0 { pixel[0] - pixel[2] } else { pixel[0] }
+        };
+        let shown = all.iter().zip(&residual).map(without).collect();
+        let mut standing = vec![0.0; all.len()];
+        add_common([&mut residual, &mut standing], [plane(3), plane(4)]);
         let light = |i: usize| Light::new(noisy.map(|p| p[i]), denoised.map(|p| p[i]));
         let light = (0..noisy[0].len()).map(light).collect();
-        Ok(Self { size, shown: plane(0).values, residual, standing, light, display: display.clone() })
+        Ok(Self { size, shown, residual, standing, light, display: display.clone() })
     }
 
     /// The error of a picture whose truth is known, in the same form: for comparison. In a film, all of it is taken
@@ -140,7 +147,8 @@ impl DenoisedError {
         self.size
     }
 
-    /// Luminance Y′ of the picture as displayed, row-major, in [0, 1].
+    /// Luminance Y′ of the picture as displayed, row-major, in [0, 1], without white dots that one half of its samples
+    /// alone has.
     pub fn shown(&self) -> &[f32] {
         &self.shown
     }
@@ -155,7 +163,8 @@ impl DenoisedError {
     pub fn planes(&self, tile: Tile, viewing: Viewing) -> TilePlanes {
         let planes = TilePlanes::gather(self.size, tile, |x, y| {
             let pixel = y * self.size.0 + x;
-            ([self.shown[pixel]; 3], [self.residual[pixel]; 3])
+            let (shown, residual) = (self.shown[pixel], self.residual[pixel]);
+            ([shown + 0.5 * residual; 3], [residual; 3])
         });
         TilePlanes { viewing, ..planes }
     }
@@ -242,7 +251,8 @@ impl DenoisedError {
     }
 
     /// A picture as displayed with this wrong with it, whose brightness is not in question.
-    pub(crate) fn of(size: (usize, usize), shown: Vec<f32>, residual: Vec<f32>, display: &Display) -> Self {
+    pub(crate) fn of(size: (usize, usize), shown: Vec<f32>, mut residual: Vec<f32>, display: &Display) -> Self {
+        settle_sign(&mut residual);
         Self { size, shown, residual, standing: Vec::new(), light: Vec::new(), display: display.clone() }
     }
 
@@ -274,6 +284,16 @@ impl DenoisedError {
     }
 }
 
+/// Of a difference of two halves, either sign is as likely. One has to be taken, whichever half is which: that which has
+/// the stronger peaks.
+fn settle_sign(difference: &mut [f32]) {
+    let skew: f64 = difference.iter().map(|&value| f64::from(value).powi(3)).sum();
+    let first = difference.iter().find(|&&value| value != 0.0);
+    if skew < 0.0 || (skew == 0.0 && first.is_some_and(|&value| value < 0.0)) {
+        difference.iter_mut().for_each(|value| *value = -*value);
+    }
+}
+
 /// Shows one pixel. Residuals are multiplied by the slope of the display at the denoised mean: the display
 /// would bend noise so that its mean moves, and the bend would pass for bias.
 fn displayed(display: &Display, noisy: [Rgb; 2], denoised: [Rgb; 2]) -> Displayed {
@@ -289,8 +309,11 @@ fn displayed(display: &Display, noisy: [Rgb; 2], denoised: [Rgb; 2]) -> Displaye
         let along = |c: usize| slope[c] * (noisy[half][c] - denoised[half][c]);
         (along(0) + along(1) + along(2)).clamp(-MOST, MOST)
     };
-    let difference = 0.5 * (display.luma(denoised[0]) - display.luma(denoised[1]));
-    [display.luma(mean), difference, residual(0), residual(1)]
+    let [shown, a, b] = [mean, denoised[0], denoised[1]].map(|pixel| display.luma(pixel));
+    // What one half alone has, and is as white in the mean as there, is seen as a whole
+    let held = held([shown, a, b], [0.5; 2]);
+    let (difference, dot) = (0.5 * (1.0 + held) * (a - b), held * (a - b).abs());
+    [shown, difference, dot, residual(0), residual(1)]
 }
 
 /// Adds to both sums, scale by scale, the share of the mean of two residuals that they have in common.

@@ -339,7 +339,7 @@ fn compare(
         return Ok(PyExcess { excess, size, map, squares });
     };
     let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());
-    let compared = pair.compare(params).map_err(Raise::raise)?;
+    let compared = pair.compare(params);
     let halves = DenoisedHalves { size, noisy: [&pictures[0], &pictures[1]], denoised: [&da, &db] };
     let error = DenoisedError::new(&halves, compared.display()).map_err(|error| failed(&error))?;
     let found = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;

@@ -15,7 +15,7 @@ const EPSILON: f64 = 1e-4;
 /// The criterion of Blender Cycles (`film/adaptive_sampling.h` and `scene/integrator.cpp` of Blender 4).
 ///
 /// The error of a pixel is Σ|I − A|/(10⁻⁴ + n) over its channels, with exposure applied: I is the mean of all
-/// samples, A that of one half; n is √ΣI if ΣI < 1, otherwise ΣI. A pixel with an error below `threshold` has
+/// samples, A that of half of them; n is √ΣI if ΣI < 1, otherwise ΣI. A pixel with an error below `threshold` has
 /// converged for good, unless one of its eight neighbours has not. No pixel converges before
 /// [`CyclesAdaptive::min_spp`].
 ///

@@ -17,18 +17,20 @@ pub(crate) fn enough(passed: usize, pixels: usize, share: f64) -> bool {
 }
 
 /// Σ|I − A| and ΣI over the channels of one pixel, both times `exposure`: I is the mean of all samples, A
-/// that of half A (Dammertz et al. 2010, §2.1). `None` if a half has no valid sample: the error is unknown.
+/// that of half of them (Dammertz et al. 2010, §2.1). `None` if a half has no valid sample: the error is unknown.
+///
+/// Of even halves, |I − A| = |A − B|/2, whichever is taken. Of uneven ones, |A − B|·√(n_A·n_B)/n has the same noise.
 pub(crate) fn half_difference(film: &Film, tile: usize, pixel: usize, exposure: f64) -> Option<(f64, f64)> {
     let [(a, na), (b, nb)] = film.pixel_halves(tile, pixel);
     if na == 0 || nb == 0 {
         return None;
     }
-    // I − A = (B − A)·n_B/n, without the rounding of I.
-    let weight = nb as f64 / (na + nb) as f64;
-    let step = |c: usize| (f64::from(b[c]) - f64::from(a[c])) * weight;
-    let difference: f64 = (0..3).map(|c| step(c).abs()).sum();
-    let sum: f64 = (0..3).map(|c| f64::from(a[c]) + step(c)).sum();
-    Some((difference * exposure, sum * exposure))
+    let (na, nb) = (na as f64, nb as f64);
+    let all = na + nb;
+    let channels = || a.into_iter().zip(b).map(|(a, b)| (f64::from(a), f64::from(b)));
+    let difference: f64 = channels().map(|(a, b)| (a - b).abs()).sum();
+    let sum: f64 = channels().map(|(a, b)| (a * na + b * nb) / all).sum();
+    Some((difference * (na * nb).sqrt() / all * exposure, sum * exposure))
 }
 
 /// The number of samples that is enough for a share of a tile's pixels; `None` if some of these need

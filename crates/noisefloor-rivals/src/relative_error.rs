@@ -68,19 +68,25 @@ struct Batches {
 
 impl Batches {
     fn update(&mut self, halves: [(Rgb, u64); 2]) {
-        for (before, (now, samples)) in self.halves.iter_mut().zip(halves) {
+        let mut new = [(0.0, 0); 2];
+        for ((before, (now, samples)), new) in self.halves.iter_mut().zip(halves).zip(&mut new) {
             let after = (f64::from(luminance(now)), samples);
-            let new = after.1.saturating_sub(before.1);
-            if new > 0 {
+            let more = after.1.saturating_sub(before.1);
+            if more > 0 {
                 let (n, m) = (after.1 as f64, before.1 as f64);
-                let batch = (after.0 * n - before.0 * m) / new as f64;
+                *new = ((after.0 * n - before.0 * m) / more as f64, more);
                 *before = after;
-                self.count += 1;
-                self.samples += new as f64;
-                let step = batch - self.mean;
-                self.mean += step * new as f64 / self.samples;
-                self.squares += step * (batch - self.mean) * new as f64;
             }
+        }
+        // In an order that does not hang on which half is which
+        new.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (batch, samples) in new.into_iter().filter(|(_, samples)| *samples > 0) {
+            let samples = samples as f64;
+            self.count += 1;
+            self.samples += samples;
+            let step = batch - self.mean;
+            self.mean += step * samples / self.samples;
+            self.squares += step * (batch - self.mean) * samples;
         }
     }
 

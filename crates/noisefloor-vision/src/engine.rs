@@ -14,6 +14,15 @@ use crate::workspace::VisionWorkspace;
 use multiversion::multiversion;
 use std::ops::Range;
 
+/// What eyes are adapted to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Adapted {
+    /// The reference, as in ColorVideoVDP.
+    ToReference,
+    /// The mean of both pictures, where neither is the reference.
+    ToBoth,
+}
+
 /// What is constant for a display.
 #[derive(Clone, Debug)]
 pub(crate) struct Engine {
@@ -92,6 +101,24 @@ impl Engine {
         }
     }
 
+    /// In a film, filters two pictures over time, of which neither is the reference: what they have in common is the same
+    /// in every frame.
+    pub(crate) fn filter_both<const N: usize>(&self, size: Size, workspace: &mut VisionWorkspace) {
+        let Some(gains) = self.film else { return };
+        let VisionWorkspace { gauss: [one, other], flicker, .. } = workspace;
+        for channel in 0..N {
+            let pairs = one[channel][0].iter_mut().zip(&mut other[channel][0]).take(size.area());
+            for ((one, other), flicker) in pairs.zip(&mut flicker[0]) {
+                let (same, difference) = (0.5 * (*one + *other), *one - *other);
+                if channel == 0 {
+                    *flicker = gains[TRANSIENT] * difference;
+                }
+                let apart = 0.5 * gains[channel] * difference;
+                (*one, *other) = (same + apart, same - apart);
+            }
+        }
+    }
+
     /// Visible differences of a band, of `N` channels and that of films. Contrasts are worked out in the first part of it,
     /// which has to have [`BLUR_RADIUS`] more pixels around, where there are any, than the second, in which
     /// differences are.
@@ -100,11 +127,12 @@ impl Engine {
         band: usize,
         size: Size,
         (contrasts, differences): (Part, Part),
+        adapted: Adapted,
         workspace: &mut VisionWorkspace,
     ) {
         let blurs = size.width > BLUR_RADIUS && size.height > BLUR_RADIUS;
         for y in contrasts.rows() {
-            self.contrasts::<N>(band, size, y, contrasts.columns(), blurs, workspace);
+            self.contrasts::<N>((band, size), y, contrasts.columns(), (adapted, blurs), workspace);
         }
         let VisionWorkspace { smaller, differences: planes, .. } = workspace;
         let columns = differences.columns();
@@ -126,11 +154,10 @@ impl Engine {
     /// Differences of contrasts and masking contrasts in row `y` of a band.
     fn contrasts<const N: usize>(
         &self,
-        band: usize,
-        size: Size,
+        (band, size): (usize, Size),
         y: usize,
         columns: Range<usize>,
-        blurs: bool,
+        (adapted, blurs): (Adapted, bool),
         workspace: &mut VisionWorkspace,
     ) {
         let VisionWorkspace { gauss, flicker, differences, smaller, rows, .. } = workspace;
@@ -140,8 +167,18 @@ impl Engine {
             }
         }
         let coarse = &rows.coarse;
+        // What eyes are adapted to, and what the flicker of a film is seen on
+        let [sensitive_to, flickers_on] = match adapted {
+            Adapted::ToReference => [1, 0].map(|of| &coarse[of][0][columns.clone()]),
+            Adapted::ToBoth => {
+                let mean = &mut rows.mean[columns.clone()];
+                let [test, reference] = [0, 1].map(|of| &coarse[of][0][columns.clone()]);
+                mean.iter_mut().zip(test).zip(reference).for_each(|((mean, a), b)| *mean = 0.5 * (a + b));
+                [&*mean; 2]
+            }
+        };
         let places = &mut rows.places[columns.clone()];
-        place_row(&coarse[1][0][columns.clone()], places);
+        place_row(sensitive_to, places);
         let here = y * size.width + columns.start..y * size.width + columns.end;
         for channel in 0..N {
             let sensitivity = &mut rows.sensitivity[..columns.len()];
@@ -175,7 +212,7 @@ impl Engine {
             let noise = Row {
                 fine: &flicker[band][here.clone()],
                 coarse: &rows.flicker[columns.clone()],
-                background: &coarse[0][0][columns],
+                background: flickers_on,
             };
             transient_row(noise, sensitivity, &mut differences[TRANSIENT][band][here]);
         }

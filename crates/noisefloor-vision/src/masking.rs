@@ -91,9 +91,9 @@ pub(crate) fn transient_row(noise: Row<'_>, sensitivity: &[f32], difference: &mu
     let sensitivity = &sensitivity[..n];
     for x in 0..n {
         let background = if background[x] > 0.01 { background[x] } else { 0.01 };
-        let contrast = (fine[x] - coarse[x]) / background;
+        let contrast = ((fine[x] - coarse[x]) / background).abs();
         let contrast = if contrast < LARGEST_CONTRAST { contrast } else { LARGEST_CONTRAST };
-        difference[x] = contrast.abs() * exp2(sensitivity[x]);
+        difference[x] = contrast * exp2(sensitivity[x]);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The whole metric: two pictures → quality and a map.
 
 use crate::check::{check_pixels, checked};
-use crate::engine::{Engine, build, collapse};
+use crate::engine::{Adapted, Engine, build, collapse};
 use crate::error::VisionError;
 use crate::masking::EPSILON;
 use crate::part::Part;
@@ -113,7 +113,7 @@ impl VisionModel {
         let mut pooled = Vec::with_capacity(sizes.len());
         for (band, &size) in sizes[..baseband].iter().enumerate() {
             let whole = Part::whole(size);
-            engine.band::<CHANNELS>(band, size, (whole, whole), workspace);
+            engine.band::<CHANNELS>(band, size, (whole, whole), Adapted::ToReference, workspace);
             pooled.push(pool(&workspace.differences, band, size, film));
         }
         engine.baseband(baseband, sizes[baseband], workspace);

@@ -3,7 +3,7 @@
 
 use crate::check::{check_pixels, check_values, checked};
 use crate::csf::OpponentChannel;
-use crate::engine::{Engine, build, collapse};
+use crate::engine::{Adapted, Engine, build, collapse};
 use crate::error::VisionError;
 use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST, grown};
 use crate::model::VisionModel;
@@ -15,22 +15,23 @@ use crate::temporal::TRANSIENT;
 use crate::workspace::{Sizes, VisionWorkspace};
 use std::ops::Range;
 
-/// A picture and what is wrong with it, as code values of the display, row by row.
+/// Two pictures that are compared, as what lies in the middle between them and what one has more than the other; code
+/// values of the display, row by row. Neither is the right one: differences are the same for −`residual`, to the bit.
 #[derive(Clone, Copy, Debug)]
 pub enum ResidualPixels<'a> {
     /// In colour.
     Rgb {
-        /// The picture.
+        /// The middle.
         picture: &'a [[f32; 3]],
-        /// Added to the picture, it makes the one that is judged.
+        /// With half of it added and taken away, the middle makes the two pictures.
         residual: &'a [[f32; 3]],
     },
     /// As greys: two thirds of the time of the achromatic channel of colours, and blind to noise that is
     /// only in colour.
     Grey {
-        /// The picture.
+        /// The middle.
         picture: &'a [f32],
-        /// Added to the picture, it makes the one that is judged.
+        /// With half of it added and taken away, the middle makes the two pictures.
         residual: &'a [f32],
     },
 }
@@ -118,9 +119,9 @@ impl VisionModel {
     /// has grown to the patch.
     ///
     /// In a film ([`crate::Viewing::frames_per_second`]), the residual is one of those that its frames have, each a new
-    /// one. Differences are those of [`VisionModel::compare`] before they are pooled, without its coarsest band,
-    /// and without the constant 10⁻⁵ that makes its pooling over channels differentiable; so they follow
-    /// [`rescaled`].
+    /// one. Differences are those of [`VisionModel::compare`] of the two pictures before they are pooled, without its
+    /// coarsest band, and without the constant 10⁻⁵ that makes its pooling over channels differentiable; so they follow
+    /// [`rescaled`]. Of two pictures of which neither is the reference, eyes are adapted to the mean of both.
     ///
     /// # Errors
     /// If a side has fewer than four pixels, or the pictures are too large, of another size, or not finite,
@@ -227,6 +228,9 @@ pub fn rescaled(difference: f32, contrast: f32) -> f32 {
     grown(difference, contrast.clamp(1e-6, 1e6).powf(EXPONENT))
 }
 
+/// What the two pictures have of the residual beside the middle between them.
+const SHARES: [f32; 2] = [0.5, -0.5];
+
 /// Converts both pictures into opponent channels.
 fn load(
     engine: &Engine,
@@ -241,26 +245,26 @@ fn load(
             for pixels in [picture, residual] {
                 check_pixels(pixels, size)?;
             }
-            let row = |y: usize, row: &mut [[f32; 3]]| row.copy_from_slice(&picture[y * width..][..width]);
-            let noisy = |y: usize, row: &mut [[f32; 3]]| {
-                let [picture, residual] = [picture, residual].map(|pixels| &pixels[y * width..][..width]);
-                let sums = picture.as_flattened().iter().zip(residual.as_flattened());
-                row.as_flattened_mut().iter_mut().zip(sums).for_each(|(out, (a, b))| *out = a + b);
-            };
-            if channels == 1 {
-                engine.load::<1>(0, size, workspace, noisy);
-                engine.load::<1>(1, size, workspace, row);
-            } else {
-                engine.load::<CHANNELS>(0, size, workspace, noisy);
-                engine.load::<CHANNELS>(1, size, workspace, row);
+            for (of, share) in SHARES.into_iter().enumerate() {
+                let row = |y: usize, row: &mut [[f32; 3]]| {
+                    let [picture, residual] = [picture, residual].map(|pixels| &pixels[y * width..][..width]);
+                    let sums = picture.as_flattened().iter().zip(residual.as_flattened());
+                    row.as_flattened_mut().iter_mut().zip(sums).for_each(|(out, (a, b))| *out = a + share * b);
+                };
+                if channels == 1 {
+                    engine.load::<1>(of, size, workspace, row);
+                } else {
+                    engine.load::<CHANNELS>(of, size, workspace, row);
+                }
             }
         }
         ResidualPixels::Grey { picture, residual } => {
             for values in [picture, residual] {
                 check_values(values, size)?;
             }
-            engine.load_grey(0, size, workspace, |i| picture[i] + residual[i]);
-            engine.load_grey(1, size, workspace, |i| picture[i]);
+            for (of, share) in SHARES.into_iter().enumerate() {
+                engine.load_grey(of, size, workspace, |i| picture[i] + share * residual[i]);
+            }
         }
     }
     Ok(())
@@ -277,12 +281,12 @@ fn differ<const N: usize>(
     part: Part,
     workspace: &mut VisionWorkspace,
 ) {
-    engine.filter::<N>(sizes[0], false, workspace);
+    engine.filter_both::<N>(sizes[0], workspace);
     build::<N>(sizes, engine.film.is_some(), workspace);
     for band in bands {
         let wanted = part.at(band).wider(MARGIN, sizes[band]);
         let around = wanted.wider(BLUR_RADIUS, sizes[band]);
-        engine.band::<N>(band, sizes[band], (around, wanted), workspace);
+        engine.band::<N>(band, sizes[band], (around, wanted), Adapted::ToBoth, workspace);
     }
 }
 

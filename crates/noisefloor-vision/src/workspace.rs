@@ -60,6 +60,7 @@ pub(crate) struct Rows {
     pub(crate) narrow: Vec<f32>,
     pub(crate) coarse: [[Vec<f32>; CHANNELS]; 2],
     pub(crate) flicker: Vec<f32>,
+    pub(crate) mean: Vec<f32>,
     pub(crate) places: Vec<f32>,
     pub(crate) sensitivity: Vec<f32>,
     pub(crate) padded: Vec<f32>,
@@ -89,11 +90,11 @@ impl VisionWorkspace {
         }
         self.smaller[..channels].iter_mut().for_each(|plane| reserve(plane, size.area()));
         let width = size.width;
-        let Rows { codes, narrow, coarse, flicker, places, sensitivity, padded } = &mut self.rows;
+        let Rows { codes, narrow, coarse, flicker, mean, places, sensitivity, padded } = &mut self.rows;
         if codes.len() < width {
             codes.resize(width, [0.0; 3]);
         }
-        coarse.iter_mut().flatten().chain([flicker, places, sensitivity]).for_each(|row| reserve(row, width));
+        coarse.iter_mut().flatten().chain([flicker, mean, places, sensitivity]).for_each(|row| reserve(row, width));
         reserve(narrow, width + 4);
         reserve(padded, width + 2 * BLUR_RADIUS);
         sizes

@@ -1,7 +1,7 @@
 //! What a tile is judged by: its display luminance, and its noise.
 
 use crate::display::{Display, luma_row, luminance};
-use crate::film::Film;
+use crate::film::{Film, blend_row, weights};
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use ndarray::{Array2, s};
@@ -63,15 +63,18 @@ thread_local! {
     static BUFFERS: RefCell<Buffers> = RefCell::default();
 }
 
-/// A tile as displayed, and its noise. All planes are display-encoded and have the same shape (rows,
-/// columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around
+/// Two pictures of a tile as displayed, and what they differ by. All planes are display-encoded and have the same shape
+/// (rows, columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around
 /// it. Neighbours are read where they exist; beyond the image, it is mirrored.
+///
+/// What is judged is `image` + `residual`/2 beside `image` − `residual`/2. Neither of them is the right one, so that
+/// nothing changes if all of the residual changes its sign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TilePlanes {
-    /// Luminance Y′ in [0, 1].
+    /// Luminance Y′ of the middle between the two pictures, in [0, 1].
     pub image: Array2<f32>,
-    /// Residual of the luminance Y′: the picture minus what it is compared with, scaled so that its standard
-    /// deviation is that of the noise in the picture.
+    /// Residual of the luminance Y′: the difference of the two pictures, scaled so that its standard deviation is that
+    /// of the noise that is judged.
     pub residual: Array2<f32>,
     /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in
     /// floating point.
@@ -115,30 +118,29 @@ impl TilePlanes {
         if fourths > 0.0 { (squares * squares / (fourths * residuals.len() as f64)) as f32 } else { 0.0 }
     }
 
-    /// As [`TilePlanes::gather`] of `N` linear pictures, of which the first is what is shown.
-    /// `read(y, columns, pictures, numbers)` reads the pixels of them in row `y` and these columns, and one
-    /// number more for each; `residual` says what is noise, from the display luminances and that number. A
-    /// verdict spends most of its time here: rows are read and tone mapped channel by channel, in vector
-    /// instructions.
+    /// As [`TilePlanes::gather`] of `N` linear pictures. `read(y, columns, pictures, numbers)` reads the pixels of them in
+    /// row `y` and these columns, and two numbers more for each; `pixel` makes image and residual of the display
+    /// luminances and these numbers. A verdict spends most of its time here: rows are read and tone mapped channel by
+    /// channel, in vector instructions.
     fn gather_linear<const N: usize>(
         size: (usize, usize),
         tile: Tile,
         display: &Display,
-        mut read: impl FnMut(usize, &Columns, [&mut [Rgb]; N], &mut [f32]),
-        residual: impl Fn([f32; N], f32) -> f32,
+        mut read: impl FnMut(usize, &Columns, [&mut [Rgb]; N], [&mut [f32]; 2]),
+        pixel: impl Fn([f32; N], [f32; 2]) -> [f32; 2],
     ) -> Self {
-        Self::fill(size, tile, |y, columns, scratch, image, residuals| {
+        Self::fill(size, tile, |y, columns, scratch, image, residual| {
             let width = columns.all.len();
             let Scratch { linear, shown } = scratch;
             linear.resize(N * width, [0.0; 3]);
             shown.resize(N * width, 0.0);
             let mut pictures = linear.chunks_exact_mut(width);
             let pictures = std::array::from_fn(|_| pictures.next().expect("one for each picture"));
-            read(y, columns, pictures, residuals);
+            read(y, columns, pictures, [&mut *image, &mut *residual]);
             luma_row(display, linear, shown);
-            image.copy_from_slice(&shown[..width]);
-            for (i, value) in residuals.iter_mut().enumerate() {
-                *value = residual(std::array::from_fn(|n| shown[n * width + i]), *value);
+            for (i, (image, residual)) in image.iter_mut().zip(residual).enumerate() {
+                let of_pixel = std::array::from_fn(|n| shown[n * width + i]);
+                [*image, *residual] = pixel(of_pixel, [*image, *residual]);
             }
         })
     }
@@ -175,46 +177,72 @@ impl TilePlanes {
         BUFFERS.with_borrow_mut(|buffers| buffers.planes = planes);
     }
 
-    /// Evidence from the film's two halves.
+    /// Evidence from the film's two halves, on the mean of all samples.
     ///
     /// With n_A and n_B samples, Var(A − B) = σ²/n_A + σ²/n_B = σ²·(n_A + n_B)/(n_A·n_B), and the mean of all
     /// samples has σ²/(n_A + n_B); so (A − B)·√(n_A·n_B)/(n_A + n_B) has exactly the noise of the mean, also
-    /// for uneven halves. The halves are tone mapped first, since people see display values.
+    /// for uneven halves. The halves are tone mapped first, since people see display values. Where tone mapping lets the
+    /// mean be as bright as the brighter half, as at a white dot, all of their difference is seen.
     ///
-    /// A pixel without valid samples in one half gives no evidence: its residual is 0.
+    /// A pixel without valid samples in one half gives no evidence: its residual is 0. The planes of exchanged halves
+    /// are the same to the bit but for the sign of the residual.
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
-        let read = |y, columns: &Columns, [mean, a, b]: [&mut [Rgb]; 3], scales: &mut [f32]| {
-            for (half, row) in [&mut *a, &mut *b].into_iter().enumerate() {
-                match film.half_row(half, y) {
-                    Some(of_half) => columns.read(of_half, row),
-                    None => row.fill([0.0; 3]),
+        let read =
+            |y, columns: &Columns, [mean, a, b]: [&mut [Rgb]; 3], [of_a, of_b]: [&mut [f32]; 2]| {
+                for (half, row) in [&mut *a, &mut *b].into_iter().enumerate() {
+                    match film.half_row(half, y) {
+                        Some(of_half) => columns.read(of_half, row),
+                        None => row.fill([0.0; 3]),
+                    }
                 }
+                // The numbers of samples change from tile to tile, and from pixel to pixel where some were kept
+                // out.
+                let owner = |i: usize| tile.owner(grid, columns.all[i], y);
+                // The tile's own columns have one owner, in whatever row
+                let own = HALO..HALO + tile.width;
+                let mut from = 0;
+                while from < mean.len() {
+                    let of = owner(from);
+                    let alike = |&i: &usize| film.rejected() == 0 && i != own.start && owner(i) == of;
+                    let to = if from == own.start && film.rejected() == 0 {
+                        own.end
+                    } else {
+                        from + 1 + (from + 1..mean.len()).take_while(alike).count()
+                    };
+                    let counts = film.pixel_counts(of, y * grid.width() + columns.all[from]);
+                    let weights = weights(counts.map(|n| n as f64));
+                    blend_row([&a[from..to], &b[from..to]], weights, &mut mean[from..to]);
+                    of_a[from..to].fill(weights[0]);
+                    of_b[from..to].fill(weights[1]);
+                    from = to;
+                }
+            };
+        Self::gather_linear(grid.size(), tile, display, read, of_mean)
+    }
+
+    /// Evidence on the mean of two renderings of a view that share no samples, both `width`×`height` pixels: that of
+    /// [`TilePlanes::from_halves`] of a film that has them as its halves, to the bit.
+    ///
+    /// # Panics
+    /// If a rendering has fewer pixels than that.
+    pub fn from_both(
+        (width, height): (usize, usize),
+        tile: Tile,
+        display: &Display,
+        renderings: [Rendering<'_>; 2],
+    ) -> Self {
+        let weights = weights(renderings.map(|rendering| rendering.spp));
+        let read = |y, columns: &Columns, [mean, a, b]: [&mut [Rgb]; 3], numbers: [&mut [f32]; 2]| {
+            for (picture, rendering) in [&mut *a, &mut *b].into_iter().zip(renderings) {
+                columns.read(&rendering.pixels[y * width..(y + 1) * width], picture);
             }
-            // The numbers of samples change from tile to tile, and from pixel to pixel where some were kept
-            // out.
-            let owner = |i: usize| tile.owner(grid, columns.all[i], y);
-            // The tile's own columns have one owner, in whatever row
-            let own = HALO..HALO + tile.width;
-            let mut from = 0;
-            while from < mean.len() {
-                let of = owner(from);
-                let alike = |&i: &usize| film.rejected() == 0 && i != own.start && owner(i) == of;
-                let to = if from == own.start && film.rejected() == 0 {
-                    own.end
-                } else {
-                    from + 1 + (from + 1..mean.len()).take_while(alike).count()
-                };
-                let counts = film.pixel_counts(of, y * grid.width() + columns.all[from]);
-                let [na, nb] = counts.map(|n| n as f32);
-                let both = na > 0.0 && nb > 0.0;
-                scales[from..to].fill(if both { (na / (na + nb) * (nb / (na + nb))).sqrt() } else { 0.0 });
-                Film::blend_row(&a[from..to], &b[from..to], Film::weight(counts), &mut mean[from..to]);
-                from = to;
-            }
+            blend_row([a, b], weights, mean);
+            numbers.into_iter().zip(weights).for_each(|(row, weight)| row.fill(weight));
         };
-        let residual = |[_, a, b]: [f32; 3], scale| (a - b) * scale;
-        Self::gather_linear(grid.size(), tile, display, read, residual)
+        let planes = Self::gather_linear((width, height), tile, display, read, of_mean);
+        let [a, b] = renderings.map(|rendering| rendering.rounding);
+        Self { rounding: (a + b) * weights[0] * weights[1], ..planes }
     }
 
     /// Evidence on `image` from another rendering of the same view, both `width`×`height` pixels. `None` if
@@ -230,13 +258,13 @@ impl TilePlanes {
         samples: Samples,
     ) -> Option<Self> {
         let scale = residual_scale(image.spp, other.spp, samples)?;
-        let read = |y, columns: &Columns, pictures: [&mut [Rgb]; 2], _: &mut [f32]| {
+        let read = |y, columns: &Columns, pictures: [&mut [Rgb]; 2], _: [&mut [f32]; 2]| {
             for (picture, rendering) in pictures.into_iter().zip([image, other]) {
                 columns.read(&rendering.pixels[y * width..(y + 1) * width], picture);
             }
         };
-        let residual = |[a, b]: [f32; 2], _| (a - b) * scale;
-        let planes = Self::gather_linear((width, height), tile, display, read, residual);
+        let pixel = |[a, b]: [f32; 2], _| [0.5 * (a + b), (a - b) * scale];
+        let planes = Self::gather_linear((width, height), tile, display, read, pixel);
         Some(Self { rounding: (image.rounding + other.rounding) * scale * scale, ..planes })
     }
 
@@ -246,7 +274,7 @@ impl TilePlanes {
     /// If `reference` has fewer pixels than the film.
     pub fn from_reference(film: &Film, display: &Display, reference: &[Rgb], tile: Tile) -> Self {
         let grid = film.grid();
-        let read = |y, columns: &Columns, [picture]: [&mut [Rgb]; 1], references: &mut [f32]| {
+        let read = |y, columns: &Columns, [picture]: [&mut [Rgb]; 1], [references, _]: [&mut [f32]; 2]| {
             for (pixel, &x) in picture.iter_mut().zip(&columns.all) {
                 *pixel = film.pixel(tile.owner(grid, x, y), y * grid.width() + x);
             }
@@ -254,9 +282,32 @@ impl TilePlanes {
                 *number = luminance(reference[y * grid.width() + x]);
             }
         };
-        let residual = |[shown]: [f32; 1], reference| shown - reference;
-        Self::gather_linear(grid.size(), tile, display, read, residual)
+        let pixel = |[shown]: [f32; 1], [reference, _]: [f32; 2]| [0.5 * (shown + reference), shown - reference];
+        Self::gather_linear(grid.size(), tile, display, read, pixel)
     }
+}
+
+/// Image and residual of a pixel from the display luminances of the mean of all samples and of both halves, and the
+/// weights of these in the mean, 0 where one of them has no samples.
+///
+/// Where the display is as good as linear, the mean lies between the halves as its weights say, and is the middle of
+/// what is compared. At a white dot that one half alone has, it is as white as that half: what is seen of the dot is then
+/// not its share, but all that the two differ by, and the middle lies halfway between them.
+fn of_mean([mean, a, b]: [f32; 3], [of_a, of_b]: [f32; 2]) -> [f32; 2] {
+    let apart = (a - b).abs();
+    let held = held([mean, a, b], [of_a, of_b]);
+    let scale = (of_a * of_b).sqrt();
+    let scale = if scale > 0.0 { scale + (1.0 - scale) * held } else { 0.0 };
+    [mean - 0.5 * apart * held, (a - b) * scale]
+}
+
+/// How far the display holds the mean at the brighter of two halves: 0 if it lies between them as their weights say, 1 if
+/// it is as bright as that half. Squared, so that the bend of a tone curve within the noise counts for nothing.
+pub fn held([mean, a, b]: [f32; 3], [of_a, of_b]: [f32; 2]) -> f32 {
+    let linear = of_a * a + of_b * b;
+    let most = (a - b).abs() * if a < b { of_a } else { of_b };
+    let drawn = if most > 0.0 { ((mean - linear) / most).clamp(0.0, 1.0) } else { 0.0 };
+    drawn * drawn
 }
 
 /// The image coordinate that shows at `place` of a plane that begins [`HALO`] before the image, mirrored at

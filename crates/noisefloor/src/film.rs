@@ -160,6 +160,25 @@ impl Band<'_> {
     }
 }
 
+/// Weights of two halves in the mean of all samples, by their numbers of samples: 0 for a half without any.
+pub(crate) fn weights([a, b]: [f64; 2]) -> [f32; 2] {
+    let all = (a + b).max(f64::MIN_POSITIVE);
+    [(a / all) as f32, (b / all) as f32]
+}
+
+/// The means of two halves in a row of pixels, by their weights: the same bits whichever half is which, and what both
+/// have where they are equal.
+#[inline]
+pub(crate) fn blend_row([a, b]: [&[Rgb]; 2], [of_a, of_b]: [f32; 2], mean: &mut [Rgb]) {
+    let halves = a.as_flattened().iter().zip(b.as_flattened());
+    mean.as_flattened_mut().iter_mut().zip(halves).for_each(|(mean, (&a, &b))| {
+        let (low, high, of_high) = if a < b { (a, b, of_b) } else { (b, a, of_a) };
+        let near = low + (high - low) * of_high;
+        // The difference of two huge values may be none
+        *mean = if near.is_finite() { near } else { low * (1.0 - of_high) + high * of_high };
+    });
+}
+
 /// Accumulates batches of each tile into two independent halves, A and B.
 ///
 /// Each batch goes to whichever half of its tile has fewer samples, so that the two stay as even as the
@@ -469,31 +488,9 @@ impl Film {
     #[inline]
     pub fn pixel(&self, tile: usize, pixel: usize) -> Rgb {
         let [(a, na), (b, nb)] = self.pixel_halves(tile, pixel);
-        Self::blend(a, b, Self::weight([na, nb]))
-    }
-
-    /// Weight of half A in the mean of all samples, by the numbers of samples of both.
-    pub(crate) fn weight([a, b]: [u64; 2]) -> f32 {
-        (a as f64 / ((a + b).max(1)) as f64) as f32
-    }
-
-    /// The mean of halves A and B, by the weight of A.
-    #[inline]
-    fn blend(a: Rgb, b: Rgb, weight: f32) -> Rgb {
         let mut mean = [[0.0; 3]];
-        Self::blend_row(&[a], &[b], weight, &mut mean);
+        blend_row([&[a], &[b]], weights([na as f64, nb as f64]), &mut mean);
         mean[0]
-    }
-
-    /// The means of pixels of halves A and B, by the weight of A.
-    #[inline]
-    pub(crate) fn blend_row(a: &[Rgb], b: &[Rgb], weight: f32, mean: &mut [Rgb]) {
-        let halves = a.as_flattened().iter().zip(b.as_flattened());
-        mean.as_flattened_mut().iter_mut().zip(halves).for_each(|(mean, (a, b))| {
-            let near = b + (a - b) * weight;
-            // The difference of two huge values may be none
-            *mean = if near.is_finite() { near } else { a * weight + b * (1.0 - weight) };
-        });
     }
 
     /// Settles the exposure that the picture will have once it has converged. The halves tell noise from

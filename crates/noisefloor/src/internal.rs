@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 pub use crate::container::{FileFault, Format};
 pub use crate::display::ROUNDING_LUMINANCE;
-pub use crate::evidence::HALO;
+pub use crate::evidence::{HALO, held};
 pub use crate::model::familiarity::nearest;
 pub use crate::tile::check_image;
 

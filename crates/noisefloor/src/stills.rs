@@ -188,12 +188,27 @@ impl Still {
 /// A picture and what it is compared with.
 #[derive(Debug)]
 pub struct SnapshotPair<'a> {
+    /// What is judged.
     image: &'a Still,
-    other: Cow<'a, Still>,
-    evidence: Evidence,
+    /// The two pictures that are held against each other: the one that is judged and another, or its two halves.
+    pair: [Cow<'a, Still>; 2],
+    basis: Basis<'a>,
     samples: Samples,
     display: Display,
     viewing: Viewing,
+}
+
+/// What shows the noise of the picture that is judged.
+#[derive(Debug)]
+enum Basis<'a> {
+    /// Its difference from a converged one.
+    Reference,
+    /// Its difference from the other picture of the pair, which was made in this way.
+    Other(Samples),
+    /// Its difference from what the samples make that it does not have, of a picture which contains its own.
+    Rest(Still),
+    /// The difference of these two, which share no samples, and whose mean it is.
+    Halves([Cow<'a, Still>; 2]),
 }
 
 impl<'a> SnapshotPair<'a> {
@@ -237,7 +252,25 @@ impl<'a> SnapshotPair<'a> {
             Evidence::Reference => tone.settle(&other.pixels),
             Evidence::Halves => settle(&tone, image, &other, samples),
         };
-        Ok(Self { image, other, evidence, samples, display, viewing: Viewing::default() })
+        let basis = match evidence {
+            Evidence::Reference => Basis::Reference,
+            // Of a picture that was cut off at white nobody knows what its other samples were
+            Evidence::Halves if samples == Samples::Independent || image.display_referred => Basis::Other(samples),
+            Evidence::Halves if image.spp == other.spp => Basis::Other(samples),
+            Evidence::Halves if image.spp < other.spp => Basis::Rest(rest(&other, image)),
+            Evidence::Halves => Basis::Halves([Cow::Owned(rest(image, &other)), other.clone()]),
+        };
+        let pair = [Cow::Borrowed(image), other];
+        Ok(Self { image, pair, basis, samples, display, viewing: Viewing::default() })
+    }
+
+    /// The mean of two pictures that share no samples, of which it is made up to the bit as a film makes it up from its
+    /// halves.
+    pub(crate) fn of_halves(mean: &'a Still, halves: [&'a Still; 2], tone: &ToneMapping) -> Self {
+        let [a, b] = halves;
+        let display = settle(tone, a, b, Samples::Independent);
+        let (pair, basis) = (halves.map(Cow::Borrowed), Basis::Halves(halves.map(Cow::Borrowed)));
+        Self { image: mean, pair, basis, samples: Samples::Nested, display, viewing: Viewing::default() }
     }
 
     /// The same pictures on this display, from this far; without it, [`Viewing::default`].
@@ -274,20 +307,24 @@ impl<'a> SnapshotPair<'a> {
     }
 
     fn gather(&self, tile: Tile) -> Result<TilePlanes, StillError> {
-        let (image, size) = (self.image, self.image.size);
-        let at = |x: usize, y: usize| y * size.0 + x;
-        let shown = |still: &Still, x, y| self.display.encode(still.pixels[at(x, y)]);
-        let other = &*self.other;
-        match self.evidence {
-            Evidence::Halves => {
-                let pair = (image.rendering(), other.rendering());
-                let planes = TilePlanes::from_pair(size, tile, &self.display, pair, self.samples);
-                planes.ok_or(StillError::Nested(image.spp))
+        let (image, size, display) = (self.image, self.image.size, &self.display);
+        let beside = |other: &Still, samples| {
+            let pair = (image.rendering(), other.rendering());
+            TilePlanes::from_pair(size, tile, display, pair, samples).ok_or(StillError::Nested(image.spp))
+        };
+        let [_, other] = &self.pair;
+        match &self.basis {
+            Basis::Other(samples) => beside(other, *samples),
+            Basis::Rest(rest) => beside(rest, Samples::Independent),
+            Basis::Halves(halves) => {
+                let halves = halves.each_ref().map(|half| half.rendering());
+                Ok(TilePlanes::from_both(size, tile, display, halves))
             }
-            Evidence::Reference => {
+            Basis::Reference => {
+                let at = |x: usize, y: usize| y * size.0 + x;
                 let planes = TilePlanes::gather(size, tile, |x, y| {
-                    let (a, b) = (shown(image, x, y), shown(other, x, y));
-                    (a, std::array::from_fn(|c| a[c] - b[c]))
+                    let [a, b] = [image, &**other].map(|still| display.encode(still.pixels[at(x, y)]));
+                    (std::array::from_fn(|c| 0.5 * (a[c] + b[c])), std::array::from_fn(|c| a[c] - b[c]))
                 });
                 Ok(TilePlanes { rounding: image.rounding + other.rounding, ..planes })
             }
@@ -298,12 +335,12 @@ impl<'a> SnapshotPair<'a> {
     /// explains: by a tenth of the display's range on average, and three times the standard deviation from
     /// pixel to pixel. Renderings of one view have no such tiles, and a verdict on one means nothing.
     pub fn unlike_tiles(&self, grid: TileGrid) -> Vec<bool> {
-        let other = &*self.other;
         let light = |still: &Still, pixel: usize| luminance(self.display.encode(still.pixels[pixel]));
+        let [one, other] = &self.pair;
         let unlike = |tile: &Tile| {
             let rows = tile.rows(self.image.size.0);
             let differences: Vec<Vec<f32>> =
-                rows.map(|row| row.map(|p| light(self.image, p) - light(other, p)).collect()).collect();
+                rows.map(|row| row.map(|p| light(one, p) - light(other, p)).collect()).collect();
             is_unlike(&differences)
         };
         grid.tiles().collect::<Vec<_>>().par_iter().map(unlike).collect()
@@ -316,20 +353,21 @@ impl<'a> SnapshotPair<'a> {
     /// mean radiance and the median of blocks both differ, in one direction; a few bright pixels make the
     /// one, and noise of many dark ones the other.
     pub fn warnings(&self) -> Vec<StillWarning> {
-        let other = &*self.other;
-        let neighbours = self.correlation_of_neighbours(other).map(StillWarning::Neighbours);
-        let brightness = ratio_of_brightness(self.image, other).map(StillWarning::Brightness);
+        let neighbours = self.correlation_of_neighbours().map(StillWarning::Neighbours);
+        let [one, other] = &self.pair;
+        let brightness = ratio_of_brightness(one, other).map(StillWarning::Brightness);
         neighbours.into_iter().chain(brightness).collect()
     }
 
-    fn correlation_of_neighbours(&self, other: &Still) -> Option<f64> {
+    fn correlation_of_neighbours(&self) -> Option<f64> {
+        let [one, other] = &self.pair;
         let light =
             |still: &Still, pixel: usize| f64::from(luminance(self.display.encode(still.pixels[pixel])));
         const PAIRS: usize = 2 * (BLOCK - 1) * (BLOCK - 1);
         let (mut sum, mut squares, mut energy) = (0.0, 0.0, 0.0);
         for block in blocks(self.image.size) {
             let differences: Vec<f64> =
-                block.iter().map(|&pixel| light(self.image, pixel) - light(other, pixel)).collect();
+                block.iter().map(|&pixel| light(one, pixel) - light(other, pixel)).collect();
             let mean = differences.iter().sum::<f64>() / differences.len() as f64;
             let at = |x: usize, y: usize| differences[y * BLOCK + x] - mean;
             for (x, y) in (0..BLOCK - 1).flat_map(|y| (0..BLOCK - 1).map(move |x| (x, y))) {
@@ -355,6 +393,19 @@ impl<'a> SnapshotPair<'a> {
         let describe = |&tile: &Tile| Ok(oracle.describe(&self.planes(tile)?, self.image.spp.max(1.0))?);
         tiles.par_iter().map(describe).collect()
     }
+}
+
+/// What the samples make that `more` has and `fewer` has not, which `more` contains.
+fn rest(more: &Still, fewer: &Still) -> Still {
+    let spp = more.spp - fewer.spp;
+    let (of_more, of_fewer) = (more.spp / spp, fewer.spp / spp);
+    let channel = |a: f32, b: f32| {
+        let value = f64::from(a) * of_more - f64::from(b) * of_fewer;
+        value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32
+    };
+    let pixel = |(a, b): (&Rgb, &Rgb)| std::array::from_fn(|c| channel(a[c], b[c]));
+    let pixels = more.pixels.iter().zip(&fewer.pixels).map(pixel).collect();
+    Still { pixels, spp, origin: None, ..more.clone() }
 }
 
 /// The exposure of the converged picture, from both renderings of it: the same, whichever is judged.

@@ -26,7 +26,7 @@ mod search;
 pub use search::{CROP, Look, Search, crops_for};
 
 use crate::criterion::CriterionError;
-use crate::evidence::{Evidence, Samples};
+use crate::film::blend_row;
 use crate::oracle::Oracle;
 use crate::params::Params;
 use crate::rgb::Rgb;
@@ -226,7 +226,7 @@ pub fn most_in_squares(size: (usize, usize), map: &[f32]) -> Vec<(Tile, f64)> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PicturePair {
     mean: Still,
-    one: Still,
+    halves: [Still; 2],
 }
 
 /// Why two pictures could not be judged.
@@ -254,18 +254,20 @@ impl PicturePair {
     /// # Errors
     /// [`StillError`] if a pixel is not finite, the sizes do not fit, or the pictures are the same.
     pub fn new(size: (usize, usize), pictures: [Vec<Rgb>; 2], spp: f64) -> Result<Self, StillError> {
-        let [one, other] = pictures;
         let still =
             |pixels, spp| Still { size, pixels, spp, display_referred: false, rounding: 0.0, origin: None };
-        // Halved first: the sum of two large numbers may be none
-        let mean = one.iter().zip(&other).map(|(a, b)| std::array::from_fn(|c| 0.5 * a[c] + 0.5 * b[c]));
-        let (mean, one) = (still(mean.collect(), 2.0 * spp), still(one, spp));
-        if size.0.checked_mul(size.1) != Some(one.pixels.len()) || one.pixels.len() != other.len() {
-            return Err(StillError::Sizes { image: size, other: (other.len(), 1) });
+        let [one, other] = pictures.map(|pixels| still(pixels, spp));
+        if size.0.checked_mul(size.1) != Some(one.pixels.len()) || one.pixels.len() != other.pixels.len() {
+            return Err(StillError::Sizes { image: size, other: (other.pixels.len(), 1) });
         }
         one.check()?;
-        mean.check()?;
-        if one.pixels == other { Err(StillError::Same) } else { Ok(Self { mean, one }) }
+        other.check()?;
+        if one.pixels == other.pixels {
+            return Err(StillError::Same);
+        }
+        let mut mean = vec![[0.0; 3]; one.pixels.len()];
+        blend_row([&one.pixels, &other.pixels], [0.5; 2], &mut mean);
+        Ok(Self { mean: still(mean, 2.0 * spp), halves: [one, other] })
     }
 
     /// Width and height.
@@ -278,17 +280,11 @@ impl PicturePair {
         &self.mean.pixels
     }
 
-    /// The mean beside one of its halves, whose difference has as much noise as the mean has, whatever the
-    /// samples of single pixels. With the exposure of the converged picture.
-    ///
-    /// # Errors
-    /// None that [`PicturePair::new`] has not found.
-    pub fn compare(&self, params: &Params) -> Result<SnapshotPair<'_>, StillError> {
-        let halves = [&self.one];
-        let nested = Some(Samples::Nested);
-        let tone = params.tone_mapping.clone();
-        let pair = SnapshotPair::new(Evidence::Halves, &self.mean, &halves, tone, nested)?;
-        Ok(pair.seen_on(params.viewing))
+    /// The mean, and the two pictures as its halves: a session that has them as the halves of its film judges the same,
+    /// to the bit. With the exposure of the converged picture.
+    pub fn compare(&self, params: &Params) -> SnapshotPair<'_> {
+        let [one, other] = &self.halves;
+        SnapshotPair::of_halves(&self.mean, [one, other], &params.tone_mapping).seen_on(params.viewing)
     }
 
     /// How far the noise of the mean is from what the share of people asked for does not see, and the map of
@@ -298,7 +294,7 @@ impl PicturePair {
     /// [`PairError`].
     pub fn noise(&self, oracle: &Oracle, params: &Params) -> Result<(Excess, Vec<f32>), PairError> {
         let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
-        let described = self.compare(params)?.describe(oracle, grid)?;
+        let described = self.compare(params).describe(oracle, grid)?;
         let map = oracle.map_visible_noise(grid, &described, params.audience).ok_or(PairError::NoMap)?;
         let worst = (0..map.len()).max_by(|&a, &b| map[a].total_cmp(&map[b]));
         let ratio = worst.map_or(0.0, |worst| f64::from(map[worst]));
@@ -312,23 +308,30 @@ impl PicturePair {
         Excess { pictures: self.digest(), noise: self.noise_of_each(), ..excess }
     }
 
-    /// A number that follows from the pictures (FNV-1a); not 0.
+    /// A number that follows from the pictures, whichever comes first (FNV-1a); not 0.
     fn digest(&self) -> u64 {
-        let bits = self.one.pixels.iter().flatten().map(|c| u64::from(c.to_bits()));
-        let step = |hash: u64, bits: u64| (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3);
-        bits.fold(0xcbf2_9ce4_8422_2325, step).max(1)
+        let of_one = |still: &Still| {
+            let bits = still.pixels.iter().flatten().map(|c| u64::from(c.to_bits()));
+            bits.fold(0xcbf2_9ce4_8422_2325, |hash: u64, bits| (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3))
+        };
+        let [one, other] = self.halves.each_ref().map(of_one);
+        one.wrapping_add(other).max(1)
     }
 
-    /// How much noise each picture has in its noisiest squares: the mean difference from the mean of both, relative to how
+    /// How much noise each picture has in its noisiest squares: half the mean difference of the two, relative to how
     /// bright it is there, of which a tenth of the [`squares`] have more. A mean over so many pixels tells a few
     /// percent apart, which the worst place does not.
     fn noise_of_each(&self) -> f64 {
-        let (mean, one) = (&self.mean.pixels, &self.one.pixels);
+        let mean = &self.mean.pixels;
+        let [one, other] = self.halves.each_ref().map(|half| &half.pixels);
         let level = mean.as_flattened().iter().map(|&c| f64::from(c.abs())).sum::<f64>();
         let level = (level / (3 * mean.len()) as f64).max(f64::MIN_POSITIVE);
         let of_pixel = |pixel: usize| -> f64 {
-            let channels = mean[pixel].into_iter().zip(one[pixel]).map(|(a, b)| (f64::from(a), f64::from(b)));
-            channels.map(|(mean, one)| (one - mean).abs() / (mean.abs() + level)).sum()
+            let of_channel = |c: usize| {
+                let apart = f64::from(one[pixel][c]) - f64::from(other[pixel][c]);
+                0.5 * apart.abs() / (f64::from(mean[pixel][c]).abs() + level)
+            };
+            (0..3).map(of_channel).sum()
         };
         let of_square = |square: Tile| {
             square.rows(self.size().0).flatten().map(of_pixel).sum::<f64>() / square.pixels() as f64

@@ -12,6 +12,9 @@ mod descriptor;
 /// Driver, oracle and renderer together.
 #[cfg(test)]
 mod end_to_end;
+/// Halves are equals.
+#[cfg(test)]
+mod halves;
 /// Sources made by hand.
 #[cfg(test)]
 mod kit;

@@ -42,7 +42,7 @@ pub struct TrainParams {
 impl Default for TrainParams {
     /// Logistic regression, for the visible descriptor.
     fn default() -> Self {
-        let candidates = vec![SvmParams { c: 300.0, gamma: WIDE }];
+        let candidates = vec![SvmParams { c: 40.0, gamma: WIDE }];
         Self { learner: Learner::Line, candidates, range: 8.0, spread: 0.8, weighed: None }
     }
 }

@@ -177,10 +177,10 @@ pub struct Described {
     pub place: Tile,
     /// Edge of the windows in which noise is looked for, in blocks of the picture.
     pub window: usize,
-    /// Sums over the blocks of the picture that the tile has pixels of, of what windows are means of, row by row.
-    /// Empty for a descriptor without windows, and for a tile that is to be taken by its own numbers: apart from
+    /// Sums over the blocks of the picture that the tile has pixels of, of what windows are means of and of its square,
+    /// row by row. Empty for a descriptor without windows, and for a tile that is to be taken by its own numbers: apart from
     /// its neighbours.
-    pub blocks: Vec<f32>,
+    pub blocks: Vec<[f32; 2]>,
 }
 
 impl Descriptor {

@@ -14,7 +14,7 @@
 
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
 use super::texture::texture_energy;
-use super::windows::{BLOCK, PictureContrast, block_count, block_sums};
+use super::windows::{BLOCK, PictureContrast, WindowContrast, block_count, block_sums};
 use crate::descriptor::NoiseMask;
 use crate::{display::ROUNDING_LUMINANCE, evidence::TilePlanes};
 use ndarray::{Array2, ArrayView2, s};
@@ -62,11 +62,17 @@ pub(super) struct Visible {
     window: f64,
     /// Share of the picture that is less noisy than what counts as its noise.
     picture_quantile: f64,
+    /// How many times the root mean square of visible contrast in a window its mean of fourth order may be. Beyond that,
+    /// few pixels have it all, and stand out.
+    crest: f64,
+    /// How many times as noisy as its picture a tile may be. Beyond that, the picture counts as noisier than it is: that
+    /// all else is clean makes no noise invisible.
+    beside_picture: f64,
 }
 
 impl Default for Visible {
     fn default() -> Self {
-        Self { window: 0.75, picture_quantile: 0.875 }
+        Self { window: 0.75, picture_quantile: 0.875, crest: 1.35, beside_picture: 1.0 }
     }
 }
 
@@ -80,6 +86,8 @@ impl Visible {
         Ok(Self {
             window: within("window", (0.1, 10.0))?,
             picture_quantile: within("picture_quantile", (0.0, 1.0))?,
+            crest: within("crest", (1.0, 1e6))?,
+            beside_picture: within("beside_picture", (1.0, 1e6))?,
         })
     }
 
@@ -96,11 +104,17 @@ impl TileDescriptor for Visible {
     }
 
     fn version(&self) -> u16 {
-        3
+        4
     }
 
     fn parameters(&self) -> BTreeMap<String, f64> {
-        let numbers = [("window", self.window), ("picture_quantile", self.picture_quantile)];
+        let Self { window, picture_quantile, crest, beside_picture } = *self;
+        let numbers = [
+            ("window", window),
+            ("picture_quantile", picture_quantile),
+            ("crest", crest),
+            ("beside_picture", beside_picture),
+        ];
         numbers.map(|(name, number)| (name.to_owned(), number)).into()
     }
 
@@ -133,16 +147,17 @@ impl TileDescriptor for Visible {
             described.own[0] = noise_number(f64::INFINITY);
             return Ok(described);
         };
-        blocks.iter_mut().for_each(|sum| *sum *= (known * known) as f32);
+        let energy = (known * known) as f32;
+        blocks.iter_mut().for_each(|[sum, squares]| (*sum, *squares) = (*sum * energy, *squares * energy * energy));
         described.blocks = blocks;
         let alone = std::slice::from_ref(&described);
-        described.own[0] = noise_number(worst(&PictureContrast::new(alone), alone)[0]);
+        described.own[0] = noise_number(self.worst(&PictureContrast::new(alone), alone)[0]);
         Ok(described)
     }
 
     fn is_sound(&self, tile: &Described) -> bool {
         let blocks = tile.blocks.is_empty() || tile.blocks.len() == block_count(tile.place);
-        let all_finite = tile.own.iter().chain(&tile.blocks).all(|v| v.is_finite());
+        let all_finite = tile.own.iter().chain(tile.blocks.as_flattened()).all(|v| v.is_finite());
         // A window of ten degrees on a display of 2000 pixels a degree has 5000 blocks
         tile.own.len() == OWN && blocks && all_finite && (1..10_000).contains(&tile.window)
     }
@@ -153,7 +168,7 @@ impl TileDescriptor for Visible {
             if tile.blocks.is_empty() { tile.own[0] } else { noise_number(worst) }
         };
         let picture = PictureContrast::new(tiles);
-        let noises: Vec<f32> = tiles.iter().zip(worst(&picture, tiles)).map(number).collect();
+        let noises: Vec<f32> = tiles.iter().zip(self.worst(&picture, tiles)).map(number).collect();
         self.with_picture(&picture, tiles, &noises)
     }
 
@@ -169,7 +184,7 @@ impl TileDescriptor for Visible {
             let mut known = f32::NAN;
             Array2::from_shape_fn(size, |(y, x)| {
                 if x == 0 || (place.x + x).is_multiple_of(BLOCK) {
-                    known = (window(y, x) / tile.spp).sqrt() as f32;
+                    known = window(y, x).amplitude(tile.spp, self.crest) as f32;
                 }
                 known
             })
@@ -198,6 +213,14 @@ impl TileDescriptor for Visible {
 }
 
 impl Visible {
+    /// How strong the noise is in the worst window around a pixel of each tile of a picture, with the samples of the tile.
+    fn worst(self, picture: &PictureContrast, tiles: &[Described]) -> Vec<f64> {
+        let of_tile = |tile: &Described| {
+            picture.worst(picture.blocks(tile.place), tile.window).amplitude(tile.spp, self.crest) / UNIT
+        };
+        tiles.iter().map(of_tile).collect()
+    }
+
     /// Appends to each tile's own numbers, of which the first is that of `noises`, those of the picture that the tiles
     /// make up: a quantile of the amplitudes of their noise, and the mean of their light, both by area. Noise is what the tile at hand has with its own
     /// samples and the picture would have with as many.
@@ -214,28 +237,19 @@ impl Visible {
             None => tiles.iter().zip(noises).map(of_one_sample).collect(),
             Some(window) => {
                 let zones = contrast.zones(ZONE * window, window);
-                zones.into_iter().map(|(worst, blocks)| (worst.sqrt() / UNIT, blocks as f64)).collect()
+                let amplitude = |worst: WindowContrast| worst.amplitude(1.0, self.crest) / UNIT;
+                zones.into_iter().map(|(worst, blocks)| (amplitude(worst), blocks as f64)).collect()
             }
         };
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let of_picture = quantile(&all, self.picture_quantile);
         let complete = |(tile, &noise): (&Described, &f32)| {
-            let picture = [noise_number(of_picture / tile.spp.sqrt()), light as f32];
+            let of_picture = (of_picture / tile.spp.sqrt()).max(amplitude(noise) / self.beside_picture);
+            let picture = [noise_number(of_picture), light as f32];
             [noise].into_iter().chain(tile.own[1..].iter().copied()).chain(picture).collect()
         };
         tiles.iter().zip(noises).map(complete).collect()
     }
-}
-
-/// How strong the noise is in the worst window around a pixel of each tile of a picture, with the samples of the tile.
-fn worst(picture: &PictureContrast, tiles: &[Described]) -> Vec<f64> {
-    let of_tile = |tile: &Described| {
-        let (rows, columns) = picture.blocks(tile.place);
-        let windows = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
-        let worst = windows.map(|(y, x)| picture.around(y, x, tile.window)).fold(0.0, f64::max);
-        (worst / tile.spp).sqrt() / UNIT
-    };
-    tiles.iter().map(of_tile).collect()
 }
 
 /// The quantile `q` of values with weights, by increasing value: linear between the middles of the weights, from the

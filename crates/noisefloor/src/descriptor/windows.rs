@@ -1,6 +1,7 @@
-//! Means of the squared visible contrast over windows of the picture, whatever tiles it is divided into.
+//! Means of the squared visible contrast over windows of the picture, and of its fourth power, whatever tiles it is
+//! divided into.
 //!
-//! Squares of contrast are summed over blocks of the picture; a tile keeps its share of each block that it has pixels
+//! Powers of contrast are summed over blocks of the picture; a tile keeps its share of each block that it has pixels
 //! of. The blocks of all tiles make up those of the picture, and summed-area tables (Crow 1984, "Summed-area tables
 //! for texture mapping") give the mean over any window of them.
 
@@ -22,10 +23,10 @@ pub(super) fn block_count(place: Tile) -> usize {
     blocks_of(place.x, place.width).len() * blocks_of(place.y, place.height).len()
 }
 
-/// The sums of a map over the pixels of a tile, by block of the picture, row by row.
-pub(super) fn block_sums(map: DifferenceBand<'_>, place: Tile) -> Vec<f32> {
+/// The sums of a map and of its square over the pixels of a tile, by block of the picture, row by row.
+pub(super) fn block_sums(map: DifferenceBand<'_>, place: Tile) -> Vec<[f32; 2]> {
     let columns = blocks_of(place.x, place.width);
-    let mut sums = vec![0.0; block_count(place)];
+    let mut sums = vec![[0.0; 2]; block_count(place)];
     let rows: Vec<&[f32]> = map.rows().collect();
     for y in 0..place.height {
         // A map may have a value for several pixels, and begin up to a value before the tile
@@ -33,18 +34,44 @@ pub(super) fn block_sums(map: DifferenceBand<'_>, place: Tile) -> Vec<f32> {
         let of_row = ((place.y + y) / BLOCK - place.y / BLOCK) * columns.len();
         let sums = &mut sums[of_row..of_row + columns.len()];
         for x in 0..place.width {
-            sums[(place.x + x) / BLOCK - columns.start] += row[(x / map.step).min(row.len() - 1)];
+            let value = row[(x / map.step).min(row.len() - 1)];
+            let [sum, squares] = &mut sums[(place.x + x) / BLOCK - columns.start];
+            *sum += value;
+            *squares += value * value;
         }
     }
     sums
 }
 
-/// Squared visible contrast, of one sample per pixel, over a picture.
+/// Visible contrast, of one sample per pixel, over a picture.
 pub(super) struct PictureContrast {
     rows: Range<usize>,
     columns: Range<usize>,
-    /// Sums of squares, and pixels, of all blocks above and to the left: one row and column more than blocks.
-    tables: Vec<[f64; 2]>,
+    /// Sums of squares, of fourth powers, and pixels, of all blocks above and to the left: one row and column more than
+    /// blocks.
+    tables: Vec<[f64; 3]>,
+}
+
+/// Means over a window, or the largest of several windows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct WindowContrast {
+    /// Of the squares of contrast.
+    pub(super) square: f64,
+    /// Of its fourth powers.
+    pub(super) fourth: f64,
+}
+
+impl WindowContrast {
+    /// The larger of both means.
+    fn or(self, other: Self) -> Self {
+        Self { square: self.square.max(other.square), fourth: self.fourth.max(other.fourth) }
+    }
+
+    /// The contrast of so many samples: the root mean square, or the mean of fourth order over `crest` if that is more.
+    pub(super) fn amplitude(self, spp: f64, crest: f64) -> f64 {
+        let (square, fourth) = (self.square / spp, self.fourth / (spp * spp));
+        square.sqrt().max(fourth.sqrt().sqrt() / crest)
+    }
 }
 
 impl PictureContrast {
@@ -58,7 +85,7 @@ impl PictureContrast {
         let rows = hull(|t| blocks_of(t.y, t.height));
         let columns = hull(|t| blocks_of(t.x, t.width));
         let stride = columns.len() + 1;
-        let mut tables = vec![[0.0; 2]; (rows.len() + 1) * stride];
+        let mut tables = vec![[0.0; 3]; (rows.len() + 1) * stride];
         for tile in known() {
             let place = tile.place;
             let (of_rows, of_columns) = (blocks_of(place.y, place.height), blocks_of(place.x, place.width));
@@ -67,17 +94,18 @@ impl PictureContrast {
                 let height = overlap(y, place.y, place.height);
                 for x in of_columns.clone() {
                     let entry = &mut tables[(y - rows.start + 1) * stride + x - columns.start + 1];
-                    let sum = sums.next().copied().unwrap_or(0.0);
-                    entry[0] += f64::from(sum) * tile.spp;
-                    entry[1] += (height * overlap(x, place.x, place.width)) as f64;
+                    let [squares, fourths] = sums.next().copied().unwrap_or_default();
+                    entry[0] += f64::from(squares) * tile.spp;
+                    entry[1] += f64::from(fourths) * tile.spp * tile.spp;
+                    entry[2] += (height * overlap(x, place.x, place.width)) as f64;
                 }
             }
         }
         for y in 1..=rows.len() {
-            let mut along = [0.0; 2];
+            let mut along = [0.0; 3];
             for x in 1..stride {
                 let at = y * stride + x;
-                for of in 0..2 {
+                for of in 0..3 {
                     along[of] += tables[at][of];
                     tables[at][of] = along[of] + tables[at - stride][of];
                 }
@@ -91,9 +119,15 @@ impl PictureContrast {
         (blocks_of(place.y, place.height), blocks_of(place.x, place.width))
     }
 
+    /// The worst window around any of these blocks.
+    pub(super) fn worst(&self, (rows, columns): (Range<usize>, Range<usize>), window: usize) -> WindowContrast {
+        let blocks = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
+        blocks.map(|(y, x)| self.around(y, x, window)).fold(WindowContrast::default(), WindowContrast::or)
+    }
+
     /// The worst window around a block of each of the zones that the picture divides into, with as many blocks as it has:
     /// of equal size, near `edge` blocks.
-    pub(super) fn zones(&self, edge: usize, window: usize) -> Vec<(f64, usize)> {
+    pub(super) fn zones(&self, edge: usize, window: usize) -> Vec<(WindowContrast, usize)> {
         let divide = |all: &Range<usize>| {
             let count = ((all.len() as f64 / edge as f64).round() as usize).max(1);
             let (start, length) = (all.start, all.len());
@@ -101,8 +135,7 @@ impl PictureContrast {
         };
         let zone = |(rows, columns): (Range<usize>, Range<usize>)| {
             let blocks = rows.len() * columns.len();
-            let windows = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
-            (windows.map(|(y, x)| self.around(y, x, window)).fold(0.0, f64::max), blocks)
+            (self.worst((rows, columns), window), blocks)
         };
         let (rows, columns) = (&self.rows, &self.columns);
         divide(rows)
@@ -113,14 +146,14 @@ impl PictureContrast {
 
     /// The mean over a window of `edge` blocks around a block; at the edge of the picture, over the nearest window
     /// that lies in it.
-    pub(super) fn around(&self, row: usize, column: usize, edge: usize) -> f64 {
+    pub(super) fn around(&self, row: usize, column: usize, edge: usize) -> WindowContrast {
         let span = |at: usize, of: &Range<usize>| {
             let edge = edge.min(of.len());
             let start = (at - of.start).saturating_sub(edge / 2).min(of.len() - edge);
             (start, start + edge)
         };
         if self.rows.is_empty() || !self.rows.contains(&row) || !self.columns.contains(&column) {
-            return 0.0;
+            return WindowContrast::default();
         }
         let ((top, bottom), (left, right)) = (span(row, &self.rows), span(column, &self.columns));
         let stride = self.columns.len() + 1;
@@ -128,9 +161,10 @@ impl PictureContrast {
             let at = |y: usize, x: usize| self.tables[y * stride + x][of];
             at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left)
         };
-        let pixels = sum(1);
+        let pixels = sum(2);
         // Differences of sums may miss 0 by their rounding
-        if pixels > 0.0 { (sum(0) / pixels).max(0.0) } else { 0.0 }
+        let mean = |of: usize| if pixels > 0.0 { (sum(of) / pixels).max(0.0) } else { 0.0 };
+        WindowContrast { square: mean(0), fourth: mean(1) }
     }
 }
 
@@ -149,12 +183,14 @@ mod tests {
     fn divided(size: (usize, usize), edge: usize, square: impl Fn(usize, usize) -> f32) -> Vec<Described> {
         let describe = |place: Tile| {
             let spp = 16.0 * (place.index % 3 + 1) as f64;
-            let mut blocks = vec![0.0; block_count(place)];
+            let mut blocks = vec![[0.0; 2]; block_count(place)];
             let columns = blocks_of(place.x, place.width);
             for y in place.y..place.y + place.height {
                 for x in place.x..place.x + place.width {
                     let row = (y / BLOCK - place.y / BLOCK) * columns.len();
-                    blocks[row + x / BLOCK - columns.start] += square(x, y) / spp as f32;
+                    let value = square(x, y) / spp as f32;
+                    let [sum, squares] = &mut blocks[row + x / BLOCK - columns.start];
+                    (*sum, *squares) = (*sum + value, *squares + value * value);
                 }
             }
             Described { own: vec![0.0; 3], spp, place, window: 7, blocks }
@@ -185,9 +221,11 @@ mod tests {
                 let inside = ys.flat_map(|y| xs.clone().map(move |x| (x, y)));
                 let values: Vec<f64> =
                     inside.filter(|&(x, y)| x < width && y < height).map(|(x, y)| square(x, y).into()).collect();
-                let mean = values.iter().sum::<f64>() / values.len() as f64;
                 let found = picture.around(row, column, window);
-                prop_assert!((found - mean).abs() < 1e-5 * mean.max(1e-3), "{found} {mean}");
+                for (found, power) in [(found.square, 1), (found.fourth, 2)] {
+                    let mean = values.iter().map(|v| v.powi(power)).sum::<f64>() / values.len() as f64;
+                    prop_assert!((found - mean).abs() < 1e-5 * mean.max(1e-3), "{power}: {found} {mean}");
+                }
             }
         }
     }
@@ -200,7 +238,7 @@ mod tests {
         let picture = PictureContrast::new(&divided((200, 100), 40, noisy));
         let zones = picture.zones(24, 1);
         assert_eq!(zones.iter().map(|zone| zone.1).collect::<Vec<_>>(), [625, 625]);
-        assert!((zones[0].0 - 3.0).abs() < 1e-6 && zones[1].0 == 0.0, "{zones:?}");
+        assert!((zones[0].0.square - 3.0).abs() < 1e-6 && zones[1].0 == WindowContrast::default(), "{zones:?}");
         assert_eq!(picture.zones(1000, 1).len(), 1);
     }
 
@@ -209,8 +247,8 @@ mod tests {
         let mut tiles = divided((64, 32), 32, |_, _| 2.0);
         tiles[0].blocks.clear();
         let picture = PictureContrast::new(&tiles);
-        assert_eq!(picture.around(0, 0, 7), 0.0);
-        assert!((picture.around(0, 8, 7) - 2.0).abs() < 1e-6);
-        assert_eq!(PictureContrast::new(&[]).around(0, 0, 7), 0.0);
+        assert_eq!(picture.around(0, 0, 7).square, 0.0);
+        assert!((picture.around(0, 8, 7).square - 2.0).abs() < 1e-6);
+        assert_eq!(PictureContrast::new(&[]).around(0, 0, 7), WindowContrast::default());
     }
 }

@@ -324,7 +324,7 @@ impl<'a> Judges<'a> {
             ),
             other => other.into(),
         })?;
-        let compared = halves.compare(&params)?;
+        let compared = halves.compare(&params);
         if !std::mem::replace(&mut self.warned, true) {
             compared.warnings().iter().for_each(|warning| note!("warning: {warning}"));
         }

@@ -1,0 +1,210 @@
+//! Halves are equals, and light that one of them alone has found is seen. These tests know the public interface alone.
+
+use noisefloor::{
+    Oracle, Params, Rgb, Session, StopReason, StoppingCriterion, ToneMapping, Verdict,
+    display::{Display, ToneCurve, ToneTable},
+    tune::PicturePair,
+};
+use noisefloor_denoise::{DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
+use noisefloor_testkit::{Noise, bilateral};
+use noisefloor_vision::{Viewing, VisionModel, VisionWorkspace};
+
+type Criterion = Box<dyn StoppingCriterion + Send>;
+
+const SIZE: (usize, usize) = (96, 64);
+
+/// Three greys beside each other.
+fn truth(pixel: usize) -> f32 {
+    let (x, y) = (pixel % SIZE.0, pixel / SIZE.0);
+    if x < SIZE.0 / 3 {
+        0.15
+    } else if y >= SIZE.1 / 2 && x >= SIZE.0 / 2 {
+        0.8
+    } else {
+        0.4
+    }
+}
+
+/// The mean of some samples: relative noise of this strength, and `dots` pixels that are `times` as bright.
+fn rendered(noise: &mut Noise, strength: f64, dots: usize, times: f32) -> Vec<Rgb> {
+    let mut picture: Vec<Rgb> = (0..SIZE.0 * SIZE.1)
+        .map(|pixel| [(f64::from(truth(pixel)) * (1.0 + strength * noise.normal())).max(0.0) as f32; 3])
+        .collect();
+    for _ in 0..dots {
+        let pixel = noise.below(picture.len());
+        picture[pixel] = [truth(pixel) * times; 3];
+    }
+    picture
+}
+
+/// What a session makes of these halves: verdicts, map of the noise, picture, and need.
+#[derive(Debug, PartialEq)]
+struct Outcome {
+    verdicts: Vec<Option<Verdict>>,
+    map: Option<Vec<u32>>,
+    picture: Vec<Rgb>,
+    to_go: Option<u64>,
+    share: Option<f64>,
+}
+
+fn outcome(criterion: Criterion, params: &Params, halves: [(u64, &[Rgb]); 2]) -> Outcome {
+    let mut session = Session::new(SIZE.0, SIZE.1, criterion, params.clone()).unwrap();
+    for (spp, half) in halves {
+        session.push_image(spp, half).unwrap();
+    }
+    session.judge().unwrap();
+    Outcome {
+        verdicts: (0..session.film().grid().len()).map(|tile| session.verdict(tile)).collect(),
+        map: session.visible_noise().map(|map| map.into_iter().map(f32::to_bits).collect()),
+        picture: session.film().image(),
+        to_go: session.expected_samples_to_go(),
+        share: session.share_in_picture(),
+    }
+}
+
+struct Bilateral;
+
+impl Denoiser for Bilateral {
+    fn name(&self) -> String {
+        "bilateral".into()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        Ok(bilateral(picture.size, picture.radiance, 0.1))
+    }
+}
+
+fn tones() -> Vec<ToneMapping> {
+    let film = ToneCurve::new(b"film", |exposed| exposed.map(|c| (c / (c + 0.2)).powf(0.7)));
+    vec![
+        ToneMapping::default(),
+        ToneMapping::Srgb { exposure: 1.0 },
+        ToneMapping::Custom { exposure: 1.0, curve: film },
+        ToneMapping::Custom { exposure: 1.0, curve: agx_like() },
+    ]
+}
+
+/// A table like AgX: a curve of the logarithm with a toe and a shoulder, and colours that fade as they get bright.
+fn agx_like() -> ToneCurve {
+    let (edge, toe, top) = (17, 0.01, 16.0);
+    let radiances = ToneTable::radiances(edge, toe, top).unwrap();
+    let curve = |radiance: f32| {
+        let at = ((radiance.max(1e-6) / 0.18).log2() + 10.0) / 16.5;
+        1.0 / (1.0 + (-9.0 * (at.clamp(0.0, 1.0) - 0.6)).exp())
+    };
+    let mut values = Vec::new();
+    for b in &radiances {
+        for g in &radiances {
+            for r in &radiances {
+                let grey = (r + g + b) / 3.0;
+                values.push([r, g, b].map(|c| curve(0.8 * c + 0.2 * grey)));
+            }
+        }
+    }
+    ToneTable::new(edge, toe, top, values).unwrap().into_tone_curve()
+}
+
+/// Exchanging the halves changes nothing to the bit, even or uneven, with light that one of them alone has.
+#[test]
+fn exchanged_halves_are_judged_alike() {
+    let criteria: [fn() -> Criterion; 2] =
+        [|| Box::new(Oracle::bundled()), || Box::new(DenoisedQuality::new(Bilateral, 0.5))];
+    let mut noise = Noise::new(3);
+    for (case, (na, nb)) in [(64, 64), (100, 36), (36, 100), (3, 4), (300, 200)].into_iter().enumerate() {
+        for (tone, viewing) in tones().into_iter().zip(["desk", "desk,fps=24", "desk", "desk,peak=600"]) {
+            let params = Params::default().with_tile(32).with_min_spp(4);
+            let params = params.with_tone_mapping(tone).with_viewing(viewing.parse().unwrap());
+            let strength = [0.01, 0.1, 0.3][case % 3];
+            let a = rendered(&mut noise, strength, case, 1000.0);
+            let b = rendered(&mut noise, strength, 2 * case, 30.0);
+            for make in criteria {
+                let [one, other] = [[(na, &a[..]), (nb, &b[..])], [(nb, &b[..]), (na, &a[..])]];
+                let one = outcome(make(), &params, one);
+                assert!(one.verdicts.iter().all(Option::is_some), "{viewing}");
+                assert_eq!(one, outcome(make(), &params, other), "{na} and {nb} samples, {viewing}");
+            }
+        }
+    }
+}
+
+/// JODs that a window of the mean around a pixel has lost against the truth, and how white that pixel is.
+fn lost_around(pixel: usize, mean: &[Rgb], display: &Display, room: &mut VisionWorkspace) -> (f64, f32) {
+    const WINDOW: usize = 28;
+    let (x, y) = (pixel % SIZE.0, pixel / SIZE.0);
+    let from = |at: usize, side: usize| at.saturating_sub(WINDOW / 2).min(side - WINDOW);
+    let (left, top) = (from(x, SIZE.0), from(y, SIZE.1));
+    let window = || (top..top + WINDOW).flat_map(|y| (left..left + WINDOW).map(move |x| y * SIZE.0 + x));
+    let shown: Vec<Rgb> = window().map(|pixel| display.encode(mean[pixel])).collect();
+    let right: Vec<Rgb> = window().map(|pixel| display.encode([truth(pixel); 3])).collect();
+    let eyes = VisionModel::new(&Viewing::default());
+    let jod = eyes.compare(&shown, &right, (WINDOW, WINDOW), room).unwrap().jod();
+    (10.0 - jod, display.luma(mean[pixel]))
+}
+
+/// A white dot that the vision model sees in the mean of all samples is in no tile that stops as converged: few dots or
+/// many, however bright, in either half or in both, on whatever noise, however the picture is shown, at the number of
+/// samples from which all noise is trusted and after it.
+#[test]
+fn a_dot_that_is_seen_is_in_no_tile_that_stops() {
+    let mut random = Noise::new(11);
+    let mut room = VisionWorkspace::default();
+    let (mut seen, mut stopped) = (0, 0);
+    let mut missed = Vec::new();
+    for case in 0..160 {
+        let between = |random: &mut Noise, low: f64, high: f64| low * (high / low).powf(random.uniform());
+        let dots = between(&mut random, 1.0, 100.5) as usize;
+        let times = between(&mut random, 10.0, 1e5) as f32;
+        let strength = between(&mut random, 1.0, 300.0) / 1000.0 * 0.1;
+        let tone = tones().swap_remove(case % 4);
+        let spp = [50, 52, 64, 500][case / 4 % 4];
+        let of_half = [dots, [0, dots][case / 16 % 2]];
+        let mut halves = of_half.map(|dots| rendered(&mut random, strength, dots, times));
+        if case / 32 % 2 == 1 {
+            halves.swap(0, 1);
+        }
+        let params = Params::default().with_tile(64).with_min_spp(2 * spp).with_tone_mapping(tone);
+        let mut session = Session::new(SIZE.0, SIZE.1, Oracle::bundled(), params).unwrap();
+        halves.iter().for_each(|half| session.push_image(spp, half).unwrap());
+        let stops = session.judge().unwrap();
+        stopped += stops.len();
+        let (mean, display) = (session.film().image(), session.display_so_far());
+        let bright = |&pixel: &usize| halves.iter().any(|half| half[pixel][0] > 5.0 * truth(pixel));
+        for pixel in (0..SIZE.0 * SIZE.1).filter(bright) {
+            let (lost, shown) = lost_around(pixel, &mean, &display, &mut room);
+            if lost < 0.3 || shown < 0.99 {
+                continue;
+            }
+            seen += 1;
+            let tile = session.film().grid().index_at(pixel % SIZE.0, pixel / SIZE.0);
+            if stops.iter().any(|stop| stop.tile.index == tile && stop.reason == StopReason::Converged) {
+                missed.push((case, dots, times, strength, lost, session.verdict(tile).unwrap().probability));
+            }
+        }
+    }
+    println!("{seen} dots seen, {stopped} tiles stopped");
+    assert!(missed.is_empty(), "{} of {seen}: {missed:?}", missed.len());
+    assert!(seen > 1000 && stopped > 0, "{seen} {stopped}");
+}
+
+/// Two pictures of one view are the halves of a session: one number for both, whichever comes first.
+#[test]
+fn two_pictures_are_two_halves() {
+    let mut noise = Noise::new(5);
+    for (case, strength) in [0.002, 0.02, 0.1].into_iter().enumerate() {
+        for tone in tones() {
+            let [a, b] = [2, 0].map(|dots| rendered(&mut noise, strength, case * dots, 1000.0));
+            let params = Params::default().with_tile(64).with_min_spp(128).with_tone_mapping(tone);
+            let judge = |one: &[Rgb], other: &[Rgb]| {
+                let pair = PicturePair::new(SIZE, [one.to_vec(), other.to_vec()], 64.0).unwrap();
+                pair.noise(&Oracle::bundled(), &params).unwrap()
+            };
+            let (excess, map) = judge(&a, &b);
+            assert_eq!((excess, &map), { let (excess, map) = judge(&b, &a); (excess, &map.clone()) });
+            let mut session = Session::new(SIZE.0, SIZE.1, Oracle::bundled(), params.clone()).unwrap();
+            session.push_image(64, &a).unwrap();
+            session.push_image(64, &b).unwrap();
+            session.judge().unwrap();
+            assert_eq!(session.visible_noise().unwrap(), map);
+        }
+    }
+}
