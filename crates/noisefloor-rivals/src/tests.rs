@@ -3,6 +3,7 @@
 use crate::testing::{NoisySource, constant, empty, view};
 use crate::{RIVALS, parse};
 use noisefloor::{Driver, Film, Params, Rgb, Stop, StoppingCriterion, Tile, Verdict};
+use noisefloor_testkit::Noise;
 
 /// Every criterion that needs no converged picture, lax enough to come to an end soon.
 const SPECS: [&str; 8] = [
@@ -43,6 +44,35 @@ fn the_number_of_threads_does_not_matter() {
             pool.install(|| drive(spec, 0.5))
         };
         assert_eq!(run(1), run(3), "{spec}");
+    }
+}
+
+/// Exchanging the halves changes no verdict to the bit, from call to call, even or uneven.
+#[test]
+fn exchanged_halves_are_judged_alike() {
+    for spec in SPECS {
+        let run = |first: usize| {
+            let mut criterion = parse(spec).unwrap();
+            let mut film = empty();
+            criterion.begin(film.grid());
+            let mut verdicts: Vec<Verdict> = Vec::new();
+            for (round, samples) in [[40, 40], [25, 60], [300, 300]].into_iter().enumerate() {
+                // The half with fewer samples is next; once they are uneven, that is one and the same
+                for half in if round < 2 { [first, 1 - first] } else { [0, 1] } {
+                    for tile in film.grid().tiles() {
+                        let mut noise = Noise::keyed(&[round as u64, half as u64, tile.index as u64]);
+                        let batch: Vec<Rgb> = (0..tile.pixels())
+                            .map(|_| [(0.4 + 0.3 * noise.normal() / (samples[half] as f64).sqrt()) as f32; 3])
+                            .collect();
+                        film.add(tile.index, samples[half], &batch).unwrap();
+                    }
+                }
+                let tiles: Vec<Tile> = film.grid().tiles().collect();
+                verdicts.extend(criterion.judge(&view(&film), &tiles).unwrap());
+            }
+            verdicts
+        };
+        assert_eq!(run(0), run(1), "{spec}");
     }
 }
 

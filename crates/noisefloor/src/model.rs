@@ -18,7 +18,7 @@ pub(crate) use familiarity::CAUTION;
 pub use familiarity::Familiarity;
 
 const FORMAT: Format = Format { magic: *b"NFMODEL\0", version: VERSION };
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 #[cfg(feature = "bundled-model")]
 static BUNDLED: &[u8] = include_bytes!("../models/human.nfm");
 

@@ -27,7 +27,7 @@ fn converged(
     let describe = |&zone: &Tile| {
         let planes = TilePlanes::gather((image.width, image.height), zone, |x, y| {
             let (a, b) = (image.pixels[y * image.width + x], other.pixels[y * image.width + x]);
-            (a, std::array::from_fn(|c| (a[c] - b[c]) * scale))
+            (std::array::from_fn(|c| 0.5 * (a[c] + b[c])), std::array::from_fn(|c| (a[c] - b[c]) * scale))
         });
         oracle.describe(&TilePlanes { rounding, ..planes }, *spp).unwrap()
     };

@@ -49,10 +49,11 @@ impl TileDescriptor for PixelPair {
         if (tile.width, tile.height) != (expected, expected) {
             return Err(DescriptorError::TileSize { expected, width: tile.width, height: tile.height });
         }
-        let counterpart = &planes.image - &planes.residual;
+        // What is compared lies to either side of the middle
+        let pair = [0.5, -0.5].map(|share| &planes.image + &(&planes.residual * share));
         let pair: [Array2<f32>; 2] = match self.mask {
-            Some(mask) => [mask.apply(&planes.image), mask.apply(&counterpart)],
-            None => [planes.image.clone(), counterpart],
+            Some(mask) => pair.each_ref().map(|picture| mask.apply(picture)),
+            None => pair,
         };
         let inner = s![tile.y..tile.y + tile.height, tile.x..tile.x + tile.width];
         Ok(pair.iter().flat_map(|plane| plane.slice(inner).into_iter().copied()).collect())
@@ -69,7 +70,7 @@ mod tests {
         let tile = TileGrid::new(16, 16, 16).unwrap().tile(0);
         TilePlanes::gather((16, 16), tile, |x, y| {
             let shown = (4 * x + y) as f32 / 64.0;
-            ([shown; 3], [shown - 0.5; 3])
+            ([0.5 * (shown + 0.5); 3], [shown - 0.5; 3])
         })
     }
 

@@ -186,7 +186,8 @@ impl Material {
     /// A picture held against the reference, or the converged one, as it is.
     fn to_reference(&self, tile: Tile, shown: &[Rgb], rounding: f64) -> TilePlanes {
         let reference = self.reference.as_ref().unwrap_or(&self.converged);
-        self.planes(tile, shown, &combine(shown, 1.0, reference, -1.0), rounding)
+        let (middle, apart) = (combine(shown, 0.5, reference, 0.5), combine(shown, 1.0, reference, -1.0));
+        self.planes(tile, &middle, &apart, rounding)
     }
 
     /// Real levels, and those of `synthesised`, twice each: two realisations of the noise.

@@ -74,7 +74,8 @@ fn the_worst_window_counts_wherever_tiles_end() {
     // Windows of 28 pixels fit into 48 columns; of fewer windows, the worst is a little less bad
     let at_left = worst(0..48, 64);
     assert!((0.85..1.01).contains(&(at_left[0] / everywhere[0])), "{at_left:?} {everywhere:?}");
-    assert!(at_left[1] < 0.1 * at_left[0], "{at_left:?}");
+    // The first columns of the other tile have windows with a few noisy pixels, whose peaks count
+    assert!(at_left[1] < 0.12 * at_left[0], "{at_left:?}");
     // Columns 50 to 78 are the middle of the picture
     let middle = worst(50..78, 64);
     assert!((middle[0] / middle[1] - 1.0).abs() < 0.1, "{middle:?}");
@@ -110,12 +111,12 @@ fn samples_of_neighbours_are_taken_to_those_of_the_tile() {
 #[test]
 fn projecting_is_what_more_samples_do() {
     let descriptor = Descriptor::visible();
-    for noise in [0.01, 0.04] {
+    for (noise, hidden) in [(0.01, 0.05), (0.04, 0.15)] {
         let (mut noisy, clean) = (own(&tile(0.5, noise)), own(&tile(0.5, noise / 2.0)));
         noisy.extend([0.0; 2]);
         assert!(descriptor.project(&mut noisy, 4.0));
-        // A weaker residual hides less of what masks it: 3 % of the contrast here
-        assert!((noisy[0] - clean[0]).abs() < 0.05, "{noisy:?} {clean:?}");
+        // Noise is in both pictures and hides a part of itself: of ten and of five steps of 8 bits, 13 % of the contrast
+        assert!((noisy[0] - clean[0]).abs() < hidden, "{noisy:?} {clean:?}");
         assert_eq!(noisy[1..3], clean[1..3]);
     }
 }
@@ -169,7 +170,9 @@ fn a_picture_of_equal_tiles_is_as_noisy_as_each_and_samples_count() {
     assert!((uneven[0][3] - uneven[0][0]).abs() < 1e-5 && (uneven[1][3] - uneven[1][0]).abs() < 1e-5);
     // Seven eighths of the way from 0 to 1
     let half = descriptor.in_picture(&[tile(16.0, 1.0), tile(16.0, 0.0)]);
-    assert!((amplitude(half[0][3]) - 0.875).abs() < 1e-3, "{half:?}");
+    assert!((amplitude(half[1][3]) - 0.875).abs() < 1e-3, "{half:?}");
+    // No tile is taken to be noisier than its picture
+    assert_eq!(half[0][3], half[0][0]);
 }
 
 /// Quantiles of equal weights are those of numpy's default; a weight counts as many values of a weight of one.
