@@ -7,6 +7,11 @@
 //! tiles, so that a verdict hardly hangs on how the picture is divided. In windows, visible contrast is as strong as
 //! the noise is: it falls as 1/√n, and the expected need follows without looking at the picture again.
 //!
+//! Two limits keep what hardly any zone that people judged has. Where few pixels have all the noise, as white dots do,
+//! its root mean square is small; there, the mean of fourth order over its window counts, divided by a ratio of the two
+//! that the noise of nearly all zones stays below. And that all else in a picture is clean makes no noise invisible: no
+//! tile is taken to be noisier than its picture. Neither makes the scores worse (docs/accuracy.md).
+//!
 //! Two more numbers say what the tile is made of, its texture and its brightness: unfamiliar tiles are told by
 //! them. Two are the picture's, its noise and its brightness: people judge a tile in its picture, and ask for more
 //! samples in bright pictures than the vision model expects. The noise of a picture is a quantile over its
