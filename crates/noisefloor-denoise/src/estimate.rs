@@ -251,7 +251,12 @@ impl DenoisedError {
     }
 
     /// A picture as displayed with this wrong with it, whose brightness is not in question.
-    pub(crate) fn of(size: (usize, usize), shown: Vec<f32>, mut residual: Vec<f32>, display: &Display) -> Self {
+    pub(crate) fn of(
+        size: (usize, usize),
+        shown: Vec<f32>,
+        mut residual: Vec<f32>,
+        display: &Display,
+    ) -> Self {
         settle_sign(&mut residual);
         Self { size, shown, residual, standing: Vec::new(), light: Vec::new(), display: display.clone() }
     }

@@ -249,7 +249,10 @@ fn load(
                 let row = |y: usize, row: &mut [[f32; 3]]| {
                     let [picture, residual] = [picture, residual].map(|pixels| &pixels[y * width..][..width]);
                     let sums = picture.as_flattened().iter().zip(residual.as_flattened());
-                    row.as_flattened_mut().iter_mut().zip(sums).for_each(|(out, (a, b))| *out = a + share * b);
+                    row.as_flattened_mut()
+                        .iter_mut()
+                        .zip(sums)
+                        .for_each(|(out, (a, b))| *out = a + share * b);
                 };
                 if channels == 1 {
                     engine.load::<1>(of, size, workspace, row);
@@ -332,8 +335,12 @@ mod tests {
         [picture, residual.collect()]
     }
 
-    fn differences(viewing: &str, [picture, residual]: &[Vec<[f32; 3]>; 2]) -> (VisionWorkspace, Range<usize>) {
-        let (model, mut room) = (VisionModel::new(&viewing.parse::<Viewing>().unwrap()), VisionWorkspace::default());
+    fn differences(
+        viewing: &str,
+        [picture, residual]: &[Vec<[f32; 3]>; 2],
+    ) -> (VisionWorkspace, Range<usize>) {
+        let (model, mut room) =
+            (VisionModel::new(&viewing.parse::<Viewing>().unwrap()), VisionWorkspace::default());
         let pixels = ResidualPixels::Rgb { picture, residual };
         let patch = ResidualPatch { pixels, size: (96, 64), columns: 0..96, rows: 0..64 };
         let bands = model.residual(&patch, VisionDetail::FULL, &mut room).unwrap().bands;

@@ -94,7 +94,11 @@ impl VisionWorkspace {
         if codes.len() < width {
             codes.resize(width, [0.0; 3]);
         }
-        coarse.iter_mut().flatten().chain([flicker, mean, places, sensitivity]).for_each(|row| reserve(row, width));
+        coarse
+            .iter_mut()
+            .flatten()
+            .chain([flicker, mean, places, sensitivity])
+            .for_each(|row| reserve(row, width));
         reserve(narrow, width + 4);
         reserve(padded, width + 2 * BLUR_RADIUS);
         sizes

@@ -255,7 +255,9 @@ impl<'a> SnapshotPair<'a> {
         let basis = match evidence {
             Evidence::Reference => Basis::Reference,
             // Of a picture that was cut off at white nobody knows what its other samples were
-            Evidence::Halves if samples == Samples::Independent || image.display_referred => Basis::Other(samples),
+            Evidence::Halves if samples == Samples::Independent || image.display_referred => {
+                Basis::Other(samples)
+            }
             Evidence::Halves if image.spp == other.spp => Basis::Other(samples),
             Evidence::Halves if image.spp < other.spp => Basis::Rest(rest(&other, image)),
             Evidence::Halves => Basis::Halves([Cow::Owned(rest(image, &other)), other.clone()]),

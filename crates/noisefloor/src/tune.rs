@@ -312,7 +312,9 @@ impl PicturePair {
     fn digest(&self) -> u64 {
         let of_one = |still: &Still| {
             let bits = still.pixels.iter().flatten().map(|c| u64::from(c.to_bits()));
-            bits.fold(0xcbf2_9ce4_8422_2325, |hash: u64, bits| (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3))
+            bits.fold(0xcbf2_9ce4_8422_2325, |hash: u64, bits| {
+                (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3)
+            })
         };
         let [one, other] = self.halves.each_ref().map(of_one);
         one.wrapping_add(other).max(1)

@@ -108,7 +108,8 @@ pub fn choices(table: &Table) -> Result<Vec<Choice>, DescriptorError> {
     for (column, window) in WINDOWS.into_iter().enumerate() {
         for quantile in PICTURE_QUANTILES {
             for beside in BESIDE_PICTURE {
-                let name = format!("window {window}°, picture quantile {quantile}, at most ×{beside} beside it");
+                let name =
+                    format!("window {window}°, picture quantile {quantile}, at most ×{beside} beside it");
                 let table = chosen(table, column, &visible(window, quantile, beside)?);
                 choices.push(Choice { name, table });
             }

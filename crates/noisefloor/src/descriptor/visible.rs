@@ -153,7 +153,9 @@ impl TileDescriptor for Visible {
             return Ok(described);
         };
         let energy = (known * known) as f32;
-        blocks.iter_mut().for_each(|[sum, squares]| (*sum, *squares) = (*sum * energy, *squares * energy * energy));
+        blocks
+            .iter_mut()
+            .for_each(|[sum, squares]| (*sum, *squares) = (*sum * energy, *squares * energy * energy));
         described.blocks = blocks;
         let alone = std::slice::from_ref(&described);
         described.own[0] = noise_number(self.worst(&PictureContrast::new(alone), alone)[0]);

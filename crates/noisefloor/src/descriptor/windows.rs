@@ -120,7 +120,11 @@ impl PictureContrast {
     }
 
     /// The worst window around any of these blocks.
-    pub(super) fn worst(&self, (rows, columns): (Range<usize>, Range<usize>), window: usize) -> WindowContrast {
+    pub(super) fn worst(
+        &self,
+        (rows, columns): (Range<usize>, Range<usize>),
+        window: usize,
+    ) -> WindowContrast {
         let blocks = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
         blocks.map(|(y, x)| self.around(y, x, window)).fold(WindowContrast::default(), WindowContrast::or)
     }
@@ -238,7 +242,10 @@ mod tests {
         let picture = PictureContrast::new(&divided((200, 100), 40, noisy));
         let zones = picture.zones(24, 1);
         assert_eq!(zones.iter().map(|zone| zone.1).collect::<Vec<_>>(), [625, 625]);
-        assert!((zones[0].0.square - 3.0).abs() < 1e-6 && zones[1].0 == WindowContrast::default(), "{zones:?}");
+        assert!(
+            (zones[0].0.square - 3.0).abs() < 1e-6 && zones[1].0 == WindowContrast::default(),
+            "{zones:?}"
+        );
         assert_eq!(picture.zones(1000, 1).len(), 1);
     }
 
