@@ -89,6 +89,9 @@ pub struct Verdict {
     /// then, however undemanding. `converged` is false, and `expected_spp` where that changes at the latest,
     /// or later.
     pub doubted: bool,
+    /// Whether the tile is open for light that it has not met: what only one half of the samples has met elsewhere
+    /// would be seen here if as much of it fell on this tile as is likely. Without that, it would be done.
+    pub unmet: bool,
     /// Whether the tile is unlike everything the criterion was made for: treat the verdict with care.
     pub unfamiliar: bool,
     /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no
@@ -224,6 +227,13 @@ pub trait StoppingCriterion {
     /// # Errors
     /// [`CriterionError`] if the criterion does not fit the job.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError>;
+
+    /// New verdicts on tiles that the last [`StoppingCriterion::judge`] was not asked about, where what it found makes
+    /// earlier ones untrue; each is returned once. A tile that had converged by one of these is open again. None, the
+    /// default, if verdicts look at nothing but their tiles.
+    fn revised(&mut self) -> Vec<(Tile, Verdict)> {
+        Vec::new()
+    }
 
     /// What the criterion keeps between verdicts and cannot derive from the film, for a
     /// [`Checkpoint`](crate::Checkpoint); `None`, the default, if it cannot be saved.

@@ -55,6 +55,7 @@ pub mod stills;
 pub mod svm;
 pub mod tile;
 pub mod tune;
+mod unmet;
 pub mod watch;
 
 /// Displays, and how far people sit from them.

@@ -7,6 +7,7 @@ use crate::evidence::{Evidence, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
 use crate::params::Audience;
 use crate::tile::{Tile, TileGrid};
+use crate::unmet::{MetOnce, Unmet};
 use noisefloor_vision::Viewing;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -18,8 +19,12 @@ pub use people::{People, PeopleError, Spread};
 /// converged.
 const NO_EVIDENCE: usize = 16;
 
-/// Samples per pixel from which noise is trusted however it is distributed.
+/// Samples per pixel from which noise is trusted however it is distributed, and whatever the size of the picture.
 const TRUSTED_SPP: u64 = 100;
+
+/// Samples of a picture from which it is trusted sooner: in fewer, light that makes up a tenth of a picture is too often
+/// met by none. Pictures from 362×362 pixels on have them at the first verdict (docs/benchmarks/unmet.md).
+const TRUSTED_SAMPLES: u64 = 1 << 21;
 
 /// Share of the pixels of a tile that have to carry its noise for it to be trusted sooner.
 const EVEN: f32 = 1.0 / 32.0;
@@ -27,11 +32,16 @@ const EVEN: f32 = 1.0 / 32.0;
 /// How many pixels that has to be at least: the energy of their noise is then known to about a sixth.
 const CARRIERS: f64 = 32.0;
 
+/// How many times the light that a tile has been found to lack unseen is looked at again.
+const MORE: f64 = 1.25;
+
 /// Judges tiles by a trained model.
 ///
 /// In a session, a tile with fewer than 100 samples per pixel is not called converged unless its noise is spread
-/// over many pixels: noise that a few samples have made is not known yet, and neither is light that no sample has
-/// found.
+/// over many pixels, and the picture has two million samples: noise that a few samples have made is not known yet, and
+/// neither is light that no sample has found. A tile is not called converged either while light would be seen in it that
+/// only one half of the samples has met in its neighbours or in the picture, if as much of that were missing here as is
+/// likely ([`Verdict::unmet`]). Where that is found later, it takes its verdict back.
 #[derive(Clone, Debug)]
 pub struct Oracle {
     model: Model,
@@ -40,6 +50,8 @@ pub struct Oracle {
     scatter: Option<f64>,
     /// What tiles of the picture were like when last described, for the picture's numbers; of tiles by index.
     described: Vec<Option<LastDescribed>>,
+    /// Verdicts that were not asked for, until they are fetched.
+    revised: Vec<(Tile, Verdict)>,
 }
 
 /// A tile as it was when last described.
@@ -48,12 +60,16 @@ struct LastDescribed {
     tile: Described,
     /// Share of its pixels that carry its noise.
     spread: f32,
+    /// What only one half has met in it.
+    met_once: MetOnce,
+    /// Mean radiance that it may have lacked where nobody would have seen it; `None` while it has noise to be seen.
+    lacked: Option<f64>,
 }
 
 impl Oracle {
     /// An oracle that calls a tile converged where that share of people sees no noise in it.
     pub fn new(model: Model, people: People) -> Self {
-        Self { model, people, scatter: None, described: Vec::new() }
+        Self { model, people, scatter: None, described: Vec::new(), revised: Vec::new() }
     }
 
     /// The bundled model, for 95 % of people.
@@ -139,6 +155,7 @@ impl Oracle {
             }),
             expected_spp,
             doubted: trained.doubted,
+            unmet: trained.unmet,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
         })
@@ -160,6 +177,7 @@ impl Oracle {
                 self.crossing(|factor| curve.at(factor)).map(|f| (spp as f64 * f64::from(f)).ceil() as u64)
             },
             doubted: false,
+            unmet: false,
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
         }
@@ -230,6 +248,116 @@ impl Oracle {
         Ok(Some(TilePlanes { viewing: view.viewing, ..planes }))
     }
 
+    /// What a tile is like now; `None` if too many of its pixels have no evidence.
+    fn look_at(&self, view: &View<'_>, tile: Tile) -> Result<Option<LastDescribed>, CriterionError> {
+        let Some(planes) = self.planes(view, tile)? else { return Ok(None) };
+        let described = self.describe(&planes, view.film.spp(tile.index) as f64);
+        let spread = planes.noise_spread();
+        planes.recycle();
+        let met_once = MetOnce::of(view.film, tile);
+        described.map(|tile| Some(LastDescribed { tile, spread, met_once, lacked: None }))
+    }
+
+    /// Verdicts on these tiles of a picture, each with whether it is all that the audience asks for; and what all tiles
+    /// are judged by: those that only light could keep open with the light that they are likely to lack.
+    fn judge_seen(
+        &self,
+        view: &View<'_>,
+        seen: &[Option<LastDescribed>],
+        tiles: &[Tile],
+    ) -> Result<(Vec<(Verdict, bool)>, Vec<Option<Described>>), CriterionError> {
+        let spread: Vec<f32> = seen.iter().map(|s| s.as_ref().map_or(0.0, |s| s.spread)).collect();
+        let mut described: Vec<Option<Described>> =
+            seen.iter().map(|s| s.as_ref().map(|s| s.tile.clone())).collect();
+        let judge = |described: &[Option<Described>]| {
+            let verdicts = self.judge_noise(view, described, &spread, tiles);
+            let enough =
+                |(tile, v): (&Tile, Verdict)| (v, self.is_enough(view, &v, view.film.spp(tile.index)));
+            tiles.iter().zip(verdicts).map(enough).collect::<Vec<_>>()
+        };
+        let by_noise = judge(&described);
+        let met = met_once(seen);
+        let unmet = Unmet::new(view.film.grid(), &met, view.viewing);
+        let lit: Vec<Option<Described>> = (tiles, &by_noise)
+            .into_par_iter()
+            .map(|(&tile, (_, enough))| if *enough { self.with_light(view, &unmet, tile) } else { Ok(None) })
+            .collect::<Result<_, _>>()?;
+        if lit.iter().all(Option::is_none) {
+            return Ok((by_noise, described));
+        }
+        tiles
+            .iter()
+            .zip(lit)
+            .filter(|(_, lit)| lit.is_some())
+            .for_each(|(tile, lit)| described[tile.index] = lit);
+        let with_light = judge(&described);
+        let worse = |(noise, light): ((Verdict, bool), (Verdict, bool))| match (noise.1, light.1) {
+            (true, enough) => (Verdict { unmet: !enough, ..light.0 }, enough),
+            (false, _) => noise,
+        };
+        Ok((by_noise.into_iter().zip(with_light).map(worse).collect(), described))
+    }
+
+    /// Verdicts on these tiles by the noise of all; `spread` says how it is distributed in each.
+    fn judge_noise(
+        &self,
+        view: &View<'_>,
+        described: &[Option<Described>],
+        spread: &[f32],
+        tiles: &[Tile],
+    ) -> Vec<Verdict> {
+        let seen: Vec<Described> = described.iter().flatten().cloned().collect();
+        let mut judged = self.model.descriptor().in_picture(&seen).into_iter();
+        let numbers: Vec<Option<Vec<f32>>> =
+            described.iter().map(|d| d.as_ref().and_then(|_| judged.next())).collect();
+        let (width, height) = view.film.grid().size();
+        let of_picture = TRUSTED_SAMPLES.div_ceil((width * height) as u64).min(TRUSTED_SPP);
+        let judge = |tile: &Tile| match &numbers[tile.index] {
+            Some(raw) => {
+                let (spp, spread) = (view.film.spp(tile.index), spread[tile.index]);
+                let verdict = self.verdict(raw, spp);
+                let even = spread >= EVEN && f64::from(spread) * tile.pixels() as f64 >= CARRIERS;
+                let trusted = if even { of_picture } else { TRUSTED_SPP };
+                if spp < trusted {
+                    let expected_spp = verdict.expected_spp.map(|need| need.max(trusted));
+                    Verdict { converged: false, expected_spp, doubted: true, ..verdict }
+                } else {
+                    verdict
+                }
+            }
+            None => Verdict {
+                probability: Some(0.0),
+                probability_without_penalty: Some(0.0),
+                ..Verdict::default()
+            },
+        };
+        tiles.par_iter().map(judge).collect()
+    }
+
+    /// Whether a verdict is all that this audience asks for, or will be said to be: fewer samples are enough for a less
+    /// demanding one.
+    fn is_enough(&self, view: &View<'_>, verdict: &Verdict, spp: u64) -> bool {
+        let audience = self.audience().then(view.audience);
+        let sooner = audience.slope < 1.0 && !verdict.doubted;
+        verdict.converged
+            || (sooner && verdict.expected_spp.is_some_and(|need| audience.samples(need) <= spp))
+    }
+
+    /// A tile as it would be with the light that it is likely to lack; `None` if nobody could tell.
+    fn with_light(
+        &self,
+        view: &View<'_>,
+        unmet: &Unmet<'_>,
+        tile: Tile,
+    ) -> Result<Option<Described>, CriterionError> {
+        let Some(shown) = unmet.shown(view.film, view.display, tile) else { return Ok(None) };
+        let Some(mut planes) = self.planes(view, tile)? else { return Ok(None) };
+        planes.residual += &shown;
+        let described = self.describe(&planes, view.film.spp(tile.index) as f64).map(Some);
+        planes.recycle();
+        described
+    }
+
     fn misfit(&self, error: DescriptorError) -> CriterionError {
         match error {
             DescriptorError::TileSize { expected, width, height } => {
@@ -238,6 +366,11 @@ impl Oracle {
             other => CriterionError::Descriptor(other),
         }
     }
+}
+
+/// What each tile has met once.
+fn met_once(seen: &[Option<LastDescribed>]) -> Vec<Option<MetOnce>> {
+    seen.iter().map(|seen| seen.as_ref().map(|seen| seen.met_once)).collect()
 }
 
 /// Samples per pixel at which P is 10, 50 and 90 %, if only the noise changes; `None` if the descriptor does not separate
@@ -265,11 +398,12 @@ impl StoppingCriterion for Oracle {
 
     fn fingerprint(&self) -> String {
         let scatter = self.scatter.map(|s| format!(", measured within {s}")).unwrap_or_default();
-        format!("model {}, {} of people{scatter}", self.model.digest(), self.people)
+        format!("model {}, {} of people{scatter}, unmet light 1", self.model.digest(), self.people)
     }
 
     fn begin(&mut self, grid: TileGrid) {
         self.described = vec![None; grid.len()];
+        self.revised.clear();
     }
 
     fn needs(&self) -> Needs {
@@ -293,17 +427,13 @@ impl StoppingCriterion for Oracle {
     }
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
-        let grid = view.film.grid();
-        let describe = |tile: Tile| {
-            let planes = self.planes(view, tile).ok()??;
-            let described = self.describe(&planes, view.film.spp(tile.index) as f64).ok();
-            planes.recycle();
-            described
-        };
-        let tiles: Vec<Tile> = grid.tiles().collect();
-        let described: Vec<Option<Described>> = tiles.into_par_iter().map(describe).collect();
+        let tiles: Vec<Tile> = view.film.grid().tiles().collect();
+        let seen: Vec<Option<LastDescribed>> =
+            tiles.par_iter().map(|&tile| self.look_at(view, tile).ok().flatten()).collect();
+        let (_, described) = self.judge_seen(view, &seen, &tiles).ok()?;
         let audience = self.audience().then(view.audience);
-        self.map_visible_noise(grid, &described.into_iter().flatten().collect::<Vec<_>>(), audience)
+        let described: Vec<Described> = described.into_iter().flatten().collect();
+        self.map_visible_noise(view.film.grid(), &described, audience)
     }
 
     /// Tiles that are not named count for the picture as they were when last described; they are described
@@ -319,45 +449,36 @@ impl StoppingCriterion for Oracle {
         let describe = |tile: Tile| {
             let spp = view.film.spp(tile.index) as f64;
             let known = this.described[tile.index].as_ref().filter(|d| d.tile.spp == spp && !due[tile.index]);
-            if known.is_some() {
-                return Ok(known.cloned());
-            }
-            let Some(planes) = this.planes(view, tile)? else { return Ok(None) };
-            let described = this.describe(&planes, spp);
-            let spread = planes.noise_spread();
-            planes.recycle();
-            described.map(|tile| Some(LastDescribed { tile, spread }))
+            if known.is_some() { Ok(known.cloned()) } else { this.look_at(view, tile) }
         };
         let all: Vec<Tile> = grid.tiles().collect();
-        self.described = all.into_par_iter().map(describe).collect::<Result<_, _>>()?;
+        self.described = all.par_iter().map(|&tile| describe(tile)).collect::<Result<_, _>>()?;
 
-        // Judge all that can be seen, and hand out what was asked for.
-        let seen: Vec<Described> = self.described.iter().flatten().map(|seen| seen.tile.clone()).collect();
-        let mut judged = self.model.descriptor().in_picture(&seen).into_iter();
-        let numbers: Vec<Option<Vec<f32>>> =
-            self.described.iter().map(|d| d.as_ref().and_then(|_| judged.next())).collect();
-        let asked: Vec<Option<Vec<f32>>> = tiles.iter().map(|t| numbers[t.index].clone()).collect();
-        let judge = |(tile, raw): (&Tile, Option<Vec<f32>>)| match raw {
-            Some(raw) => {
-                let spp = view.film.spp(tile.index);
-                let verdict = self.verdict(&raw, spp);
-                let spread = self.described[tile.index].as_ref().map_or(0.0, |seen| seen.spread);
-                let even = spread >= EVEN && f64::from(spread) * tile.pixels() as f64 >= CARRIERS;
-                let doubted = spp < TRUSTED_SPP && !even;
-                if doubted {
-                    let expected_spp = verdict.expected_spp.map(|need| need.max(TRUSTED_SPP));
-                    Verdict { converged: false, expected_spp, doubted, ..verdict }
-                } else {
-                    verdict
-                }
-            }
-            None => Verdict {
-                probability: Some(0.0),
-                probability_without_penalty: Some(0.0),
-                ..Verdict::default()
-            },
+        // Tiles that were called converged without what has been met elsewhere since are judged again
+        let met = met_once(&self.described);
+        let unmet = Unmet::new(grid, &met, view.viewing);
+        let grown = |tile: &Tile| {
+            let lacked = self.described[tile.index].as_ref().and_then(|seen| seen.lacked);
+            !due[tile.index] && lacked.is_some_and(|was| unmet.light(view.film, *tile) > MORE * was)
         };
-        Ok(tiles.par_iter().zip(asked).map(judge).collect())
+        let again = all.into_iter().filter(grown);
+        let asked: Vec<Tile> = tiles.iter().copied().chain(again).collect();
+
+        // Hand out what was asked for.
+        let mut verdicts = self.judge_seen(view, &self.described, &asked)?.0;
+        for (tile, (verdict, enough)) in asked.iter().zip(&verdicts) {
+            if let Some(seen) = &mut self.described[tile.index] {
+                let stays = *enough || !(due[tile.index] || verdict.unmet);
+                seen.lacked = stays.then(|| unmet.light(view.film, *tile));
+            }
+        }
+        let again = asked[tiles.len()..].iter().copied().zip(verdicts.split_off(tiles.len()));
+        self.revised = again.map(|(tile, (verdict, _))| (tile, verdict)).filter(|(_, v)| v.unmet).collect();
+        Ok(verdicts.into_iter().map(|(verdict, _)| verdict).collect())
+    }
+
+    fn revised(&mut self) -> Vec<(Tile, Verdict)> {
+        std::mem::take(&mut self.revised)
     }
 
     /// How each tile was last described: stopped tiles count so for the picture, whatever has become of their
@@ -369,8 +490,10 @@ impl StoppingCriterion for Oracle {
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
         let Ok(described) = container::unpack::<Vec<Option<LastDescribed>>>(state) else { return false };
         let sound = |(tile, seen): (Tile, &Option<LastDescribed>)| {
-            let Some(LastDescribed { tile: d, spread }) = seen else { return true };
+            let Some(LastDescribed { tile: d, spread, met_once, lacked }) = seen else { return true };
             spread.is_finite()
+                && met_once.is_sound()
+                && lacked.is_none_or(|light| light.is_finite() && light >= 0.0)
                 && d.place == tile
                 && d.spp.is_finite()
                 && d.spp > 0.0

@@ -391,6 +391,10 @@ impl<C: StoppingCriterion> Session<C> {
             for (tile, verdict) in judged.into_iter().zip(verdicts) {
                 stops.extend(self.take(tile.index, verdict, open));
             }
+            // What other tiles have met can say of a tile that it lacks light
+            for (tile, verdict) in self.criterion.revised() {
+                stops.extend(self.take_again(tile.index, verdict, open));
+            }
         }
 
         // Tiles that had converged for the trained audience, and still have, have now what this audience

@@ -1,0 +1,209 @@
+//! Light that no sample has met yet, estimated from light that only one half of the samples has met.
+//!
+//! A lamp behind glass may be met by one sample in a million. Until then a tile shows nothing of it, and no noise tells
+//! of it either. But what was seen once estimates what was not seen yet (Good 1953, "The population frequencies of
+//! species and the estimation of population parameters", eq. 9, after Turing): light that `n` samples have met once
+//! makes up as much of the picture, on average, as light that they have missed, wherever that is.
+//!
+//! Met once is what one half of the film has at a pixel and the other half has nowhere within a pixel of it. Of ordinary
+//! noise, that is hardly anything: the largest of nine values of the other half is exceeded one time in ten, by a
+//! little, everywhere. How much of it is missing in a place that has less of it than its surroundings hangs on how many
+//! finds make it up: m, on average, in a place as large as people look at. With rates of finding it that are
+//! exponentially distributed from place to place, of mean m, a place without a find is expected to have a rate of
+//! m/(1 + m) (the mean of the posterior of Poisson counts, a gamma distribution): where finds are many, a place that has
+//! none lacks one at the most, and a single one may lie anywhere.
+//!
+//! Whether so much light would be seen if it fell on a tile is for the criterion to say: [`Unmet::shown`] draws it.
+
+use crate::display::{Display, luminance};
+use crate::evidence::TilePlanes;
+use crate::film::Film;
+use crate::tile::{Tile, TileGrid};
+use ndarray::Array2;
+use noisefloor_vision::Viewing;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// Edge of the place that light falls on, in degrees: that of the window in which people look for noise.
+const PLACE: f64 = 0.75;
+/// What is shown is brightest in the middle of a place, by this factor.
+const PEAK: f64 = 4.0;
+/// Less on the screen than this is no light: half a step of eight bits.
+const NOTHING: f32 = 0.5 / 255.0;
+
+/// Exposed radiance of an average grey.
+const GREY: f32 = 0.18;
+
+/// What only one half has met, in a part of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct MetOnce {
+    /// Luminance times samples, summed over pixels: the light of single samples.
+    light: f64,
+    /// The same of its squares.
+    squares: f64,
+    pixels: f64,
+}
+
+impl MetOnce {
+    /// In a tile of a film that keeps two halves, of which both have samples there; else nothing.
+    pub(crate) fn of(film: &Film, tile: Tile) -> Self {
+        let grid = film.grid();
+        let mut met = Self { pixels: tile.pixels() as f64, ..Self::default() };
+        if film.half_counts(tile.index).contains(&0) {
+            return met;
+        }
+        let mut halves = [Rows::new(tile.width), Rows::new(tile.width)];
+        let inside = |y: usize| y.min(grid.height() - 1);
+        for (half, rows) in halves.iter_mut().enumerate() {
+            rows.push(film, half, tile, tile.y.saturating_sub(1));
+            rows.push(film, half, tile, tile.y);
+        }
+        for y in tile.y..tile.y + tile.height {
+            for (half, rows) in halves.iter_mut().enumerate() {
+                rows.push(film, half, tile, inside(y + 1));
+                rows.find_highest();
+            }
+            let [a, b] = &halves;
+            for x in 0..tile.width {
+                let excess = [a.here()[x + 1] - b.highest_around(x), b.here()[x + 1] - a.highest_around(x)];
+                if excess[0].max(excess[1]) > 0.0 {
+                    let counts = film.pixel_counts(tile.index, y * grid.width() + tile.x + x);
+                    met.add(excess, counts);
+                }
+            }
+        }
+        met
+    }
+
+    fn add(&mut self, excess: [f32; 2], counts: [u64; 2]) {
+        if counts.contains(&0) {
+            return;
+        }
+        // The mean of all samples has a share of each half's; times the samples, it is what a single one would bring
+        let light: f64 = excess.into_iter().zip(counts).map(|(e, n)| f64::from(e.max(0.0)) * n as f64).sum();
+        self.light += light;
+        self.squares += light * light;
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            light: self.light + other.light,
+            squares: self.squares + other.squares,
+            pixels: self.pixels + other.pixels,
+        }
+    }
+
+    /// Light for each pixel.
+    fn density(self) -> f64 {
+        self.light / self.pixels.max(1.0)
+    }
+
+    /// How much of this light is likely to be missing, for each pixel, in a place of so many pixels that has met `own`.
+    fn missing(self, own: Self, place: f64) -> f64 {
+        if self.light <= 0.0 {
+            return 0.0;
+        }
+        // Finds as large as most of the light is made up of: Σl²/Σl
+        let finds = self.density() * place * (self.light / self.squares);
+        (self.density() - own.density()).max(0.0) / (1.0 + finds)
+    }
+
+    pub(crate) fn is_sound(self) -> bool {
+        let Self { light, squares, pixels } = self;
+        [light, squares, pixels].into_iter().all(|v| v.is_finite() && v >= 0.0)
+    }
+}
+
+/// Three rows of a half, each with a pixel more to both sides; the picture's edge repeats.
+struct Rows {
+    rows: [Vec<f32>; 3],
+    /// The largest of each column.
+    highest: Vec<f32>,
+}
+
+impl Rows {
+    fn new(width: usize) -> Self {
+        let row = || vec![0.0; width + 2];
+        Self { rows: [row(), row(), row()], highest: row() }
+    }
+
+    /// Forgets the uppermost row, and takes row `y` of the picture.
+    fn push(&mut self, film: &Film, half: usize, tile: Tile, y: usize) {
+        self.rows.rotate_left(1);
+        let [.., last] = &mut self.rows;
+        let Some(row) = film.half_row(half, y) else { return };
+        let end = film.grid().width() - 1;
+        for (x, value) in last.iter_mut().enumerate() {
+            *value = luminance(row[(tile.x + x).saturating_sub(1).min(end)]).max(0.0);
+        }
+    }
+
+    fn find_highest(&mut self) {
+        let [above, here, below] = &self.rows;
+        for (x, highest) in self.highest.iter_mut().enumerate() {
+            *highest = above[x].max(here[x]).max(below[x]);
+        }
+    }
+
+    fn here(&self) -> &[f32] {
+        &self.rows[1]
+    }
+
+    /// The largest of the nine values around a pixel of the tile.
+    fn highest_around(&self, x: usize) -> f32 {
+        self.highest[x].max(self.highest[x + 1]).max(self.highest[x + 2])
+    }
+}
+
+/// What the tiles of a picture tell of light that they have not met.
+pub(crate) struct Unmet<'a> {
+    grid: TileGrid,
+    tiles: &'a [Option<MetOnce>],
+    picture: MetOnce,
+    /// Edge of a place in pixels.
+    place: f64,
+}
+
+impl<'a> Unmet<'a> {
+    /// `tiles` has what each tile of the grid has met once; `None` for one without evidence.
+    pub(crate) fn new(grid: TileGrid, tiles: &'a [Option<MetOnce>], viewing: Viewing) -> Self {
+        let picture = tiles.iter().flatten().fold(MetOnce::default(), |sum, &tile| sum.and(tile));
+        let place = (PLACE * viewing.pixels_per_degree()).max(1.0);
+        Self { grid, tiles, picture, place }
+    }
+
+    /// Mean radiance that a tile is likely to lack: by the tiles around it or by the whole
+    /// picture, whichever says more.
+    pub(crate) fn light(&self, film: &Film, tile: Tile) -> f64 {
+        let Some(own) = self.tiles[tile.index] else { return 0.0 };
+        let (columns, rows) = (self.grid.columns(), self.grid.rows());
+        let (column, row) = (tile.index % columns, tile.index / columns);
+        let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+        let around = near(row, rows)
+            .flat_map(|y| near(column, columns).map(move |x| y * columns + x))
+            .filter_map(|index| self.tiles[index])
+            .fold(MetOnce::default(), MetOnce::and);
+        let place = self.place * self.place;
+        around.missing(own, place).max(self.picture.missing(own, place)) / film.spp(tile.index).max(1) as f64
+    }
+
+    /// What this would change on the screen if it fell on the tile and all around it, in places as large as
+    /// people look at: the residual of luminance Y′, in the shape of the tile's planes. `None` if that is nothing.
+    pub(crate) fn shown(&self, film: &Film, display: &Display, tile: Tile) -> Option<Array2<f32>> {
+        let light = self.light(film, tile);
+        let most = (PEAK * light) as f32;
+        let step = |on: f32| display.luma([on + most; 3]) - display.luma([on; 3]);
+        // Screens show more of it on black or on grey than on anything brighter
+        if step(0.0).max(step(GREY / display.exposure())) < NOTHING {
+            return None;
+        }
+        let width = self.grid.width();
+        let wave = |at: usize| 1.0 + libm::cos(TAU * at as f64 / self.place);
+        let planes = TilePlanes::gather(self.grid.size(), tile, |x, y| {
+            let dark = film.pixel(tile.owner(self.grid, x, y), y * width + x);
+            let more = (light * wave(x) * wave(y)) as f32;
+            ([0.0; 3], [display.luma(dark.map(|c| c + more)) - display.luma(dark); 3])
+        });
+        Some(planes.residual)
+    }
+}
