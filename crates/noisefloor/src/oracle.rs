@@ -466,14 +466,20 @@ impl StoppingCriterion for Oracle {
 
         // Hand out what was asked for.
         let mut verdicts = self.judge_seen(view, &self.described, &asked)?.0;
+        let mut revised = Vec::new();
         for (tile, (verdict, enough)) in asked.iter().zip(&verdicts) {
+            let shows = || unmet.shown(view.film, view.display, *tile).is_some();
+            let opens = !due[tile.index] && !enough && shows();
+            if opens {
+                revised.push((*tile, *verdict));
+            }
             if let Some(seen) = &mut self.described[tile.index] {
-                let stays = *enough || !(due[tile.index] || verdict.unmet);
-                seen.lacked = stays.then(|| unmet.light(view.film, *tile));
+                let done = if due[tile.index] { *enough } else { !opens };
+                seen.lacked = done.then(|| unmet.light(view.film, *tile));
             }
         }
-        let again = asked[tiles.len()..].iter().copied().zip(verdicts.split_off(tiles.len()));
-        self.revised = again.map(|(tile, (verdict, _))| (tile, verdict)).filter(|(_, v)| v.unmet).collect();
+        self.revised = revised;
+        verdicts.truncate(tiles.len());
         Ok(verdicts.into_iter().map(|(verdict, _)| verdict).collect())
     }
 

@@ -8,7 +8,7 @@
 //! Met once is what one half of the film has at a pixel and the other half has nowhere within a pixel of it. Of ordinary
 //! noise, that is hardly anything: the largest of nine values of the other half is exceeded one time in ten, by a
 //! little, everywhere. How much of it is missing in a place that has less of it than its surroundings hangs on how many
-//! finds make it up: m, on average, in a place as large as people look at. With rates of finding it that are
+//! finds make it up: m, on average, in the samples of a place as large as people look at. With rates of finding it that are
 //! exponentially distributed from place to place, of mean m, a place without a find is expected to have a rate of
 //! m/(1 + m) (the mean of the posterior of Poisson counts, a gamma distribution): where finds are many, a place that has
 //! none lacks one at the most, and a single one may lie anywhere.
@@ -37,10 +37,10 @@ const GREY: f32 = 0.18;
 /// What only one half has met, in a part of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct MetOnce {
-    /// Luminance times samples, summed over pixels: the light of single samples.
+    /// Luminance in the mean of all samples, summed over pixels.
     light: f64,
-    /// The same of its squares.
-    squares: f64,
+    /// The same, each times that of the sample that has it all.
+    by_sample: f64,
     pixels: f64,
 }
 
@@ -79,16 +79,18 @@ impl MetOnce {
         if counts.contains(&0) {
             return;
         }
-        // The mean of all samples has a share of each half's; times the samples, it is what a single one would bring
-        let light: f64 = excess.into_iter().zip(counts).map(|(e, n)| f64::from(e.max(0.0)) * n as f64).sum();
+        let samples = (counts[0] + counts[1]) as f64;
+        // Of a half, the mean of all samples has its share
+        let light: f64 =
+            excess.into_iter().zip(counts).map(|(e, n)| f64::from(e.max(0.0)) * (n as f64 / samples)).sum();
         self.light += light;
-        self.squares += light * light;
+        self.by_sample += light * light * samples;
     }
 
     fn and(self, other: Self) -> Self {
         Self {
             light: self.light + other.light,
-            squares: self.squares + other.squares,
+            by_sample: self.by_sample + other.by_sample,
             pixels: self.pixels + other.pixels,
         }
     }
@@ -98,19 +100,21 @@ impl MetOnce {
         self.light / self.pixels.max(1.0)
     }
 
-    /// How much of this light is likely to be missing, for each pixel, in a place of so many pixels that has met `own`.
-    fn missing(self, own: Self, place: f64) -> f64 {
+    /// How much of this light is likely to be missing, for each pixel, where `own` is what was met in `spp` samples of
+    /// each pixel, and a place has so many pixels.
+    fn missing(self, own: Self, spp: f64, place: f64) -> f64 {
         if self.light <= 0.0 {
             return 0.0;
         }
-        // Finds as large as most of the light is made up of: Σl²/Σl
-        let finds = self.density() * place * (self.light / self.squares);
+        // A find as most of the light is made up of: the mean by light
+        let find = self.by_sample / self.light;
+        let finds = self.density() * place * spp / find;
         (self.density() - own.density()).max(0.0) / (1.0 + finds)
     }
 
     pub(crate) fn is_sound(self) -> bool {
-        let Self { light, squares, pixels } = self;
-        [light, squares, pixels].into_iter().all(|v| v.is_finite() && v >= 0.0)
+        let Self { light, by_sample, pixels } = self;
+        [light, by_sample, pixels].into_iter().all(|v| v.is_finite() && v >= 0.0)
     }
 }
 
@@ -183,8 +187,8 @@ impl<'a> Unmet<'a> {
             .flat_map(|y| near(column, columns).map(move |x| y * columns + x))
             .filter_map(|index| self.tiles[index])
             .fold(MetOnce::default(), MetOnce::and);
-        let place = self.place * self.place;
-        around.missing(own, place).max(self.picture.missing(own, place)) / film.spp(tile.index).max(1) as f64
+        let (spp, place) = (film.spp(tile.index) as f64, self.place * self.place);
+        around.missing(own, spp, place).max(self.picture.missing(own, spp, place))
     }
 
     /// What this would change on the screen if it fell on the tile and all around it, in places as large as
@@ -207,3 +211,6 @@ impl<'a> Unmet<'a> {
         Some(planes.residual)
     }
 }
+
+#[cfg(test)]
+mod tests;
