@@ -9,7 +9,7 @@ const TILE: usize = 32;
 /// Radiance of the picture.
 const BASE: f32 = 0.2;
 /// Deviation of a single sample, as a share of that.
-const SPREAD: f64 = 0.5;
+const SPREAD: f64 = 0.3;
 
 fn grid() -> TileGrid {
     TileGrid::new(EDGE, EDGE, TILE).unwrap()

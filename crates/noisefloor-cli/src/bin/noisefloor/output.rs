@@ -309,6 +309,11 @@ fn typical_threshold(session: &Session) -> Option<ExpectedThreshold> {
     thresholds.get(thresholds.len() / 2).copied()
 }
 
+/// Tiles that are not done, or reached a limit, only for light that they may not have met.
+fn unmet_tiles(session: &Session) -> usize {
+    (0..session.film().grid().len()).filter(|&tile| session.verdict(tile).is_some_and(|v| v.unmet)).count()
+}
+
 /// Samples that uniform rendering at the largest stop would take, over all pixels.
 fn uniform_samples(session: &Session) -> u64 {
     let grid = session.film().grid();

@@ -1,6 +1,6 @@
 //! A render in a few lines, for people.
 
-use super::{CHECKPOINT, Output, typical_threshold, uniform_samples};
+use super::{CHECKPOINT, Output, typical_threshold, uniform_samples, unmet_tiles};
 use noisefloor::{Audience, Session, driver::Clock};
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_cli::sources::Source;
@@ -76,6 +76,13 @@ impl Output {
         }
         if let Some(share) = session.share_in_picture() {
             say!("{:.0} % of people see no noise anywhere in the picture", 100.0 * share)?;
+        }
+        let unmet = unmet_tiles(session);
+        if unmet > 0 {
+            say!(
+                "tiles that only light keeps from being done which they may not have met: {unmet}; only one half of the \
+                 samples has met it elsewhere, and as much would be seen if it fell on them"
+            )?;
         }
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
