@@ -66,6 +66,14 @@ struct LastDescribed {
     lacked: Option<f64>,
 }
 
+/// What is found of tiles.
+struct Judged {
+    /// One for each tile asked about, with whether it is all that the audience asks for.
+    verdicts: Vec<(Verdict, bool)>,
+    /// What each tile of the picture is judged by.
+    described: Vec<Option<Described>>,
+}
+
 impl Oracle {
     /// An oracle that calls a tile converged where that share of people sees no noise in it.
     pub fn new(model: Model, people: People) -> Self {
@@ -258,14 +266,13 @@ impl Oracle {
         described.map(|tile| Some(LastDescribed { tile, spread, met_once, lacked: None }))
     }
 
-    /// Verdicts on these tiles of a picture, each with whether it is all that the audience asks for; and what all tiles
-    /// are judged by: those that only light could keep open with the light that they are likely to lack.
+    /// Judges tiles of a picture: those that only light could keep open, with the light that they are likely to lack.
     fn judge_seen(
         &self,
         view: &View<'_>,
         seen: &[Option<LastDescribed>],
         tiles: &[Tile],
-    ) -> Result<(Vec<(Verdict, bool)>, Vec<Option<Described>>), CriterionError> {
+    ) -> Result<Judged, CriterionError> {
         let spread: Vec<f32> = seen.iter().map(|s| s.as_ref().map_or(0.0, |s| s.spread)).collect();
         let mut described: Vec<Option<Described>> =
             seen.iter().map(|s| s.as_ref().map(|s| s.tile.clone())).collect();
@@ -283,7 +290,7 @@ impl Oracle {
             .map(|(&tile, (_, enough))| if *enough { self.with_light(view, &unmet, tile) } else { Ok(None) })
             .collect::<Result<_, _>>()?;
         if lit.iter().all(Option::is_none) {
-            return Ok((by_noise, described));
+            return Ok(Judged { verdicts: by_noise, described });
         }
         tiles
             .iter()
@@ -295,7 +302,8 @@ impl Oracle {
             (true, enough) => (Verdict { unmet: !enough, ..light.0 }, enough),
             (false, _) => noise,
         };
-        Ok((by_noise.into_iter().zip(with_light).map(worse).collect(), described))
+        let verdicts = by_noise.into_iter().zip(with_light).map(worse).collect();
+        Ok(Judged { verdicts, described })
     }
 
     /// Verdicts on these tiles by the noise of all; `spread` says how it is distributed in each.
@@ -430,7 +438,7 @@ impl StoppingCriterion for Oracle {
         let tiles: Vec<Tile> = view.film.grid().tiles().collect();
         let seen: Vec<Option<LastDescribed>> =
             tiles.par_iter().map(|&tile| self.look_at(view, tile).ok().flatten()).collect();
-        let (_, described) = self.judge_seen(view, &seen, &tiles).ok()?;
+        let Judged { described, .. } = self.judge_seen(view, &seen, &tiles).ok()?;
         let audience = self.audience().then(view.audience);
         let described: Vec<Described> = described.into_iter().flatten().collect();
         self.map_visible_noise(view.film.grid(), &described, audience)
@@ -465,7 +473,7 @@ impl StoppingCriterion for Oracle {
         let asked: Vec<Tile> = tiles.iter().copied().chain(again).collect();
 
         // Hand out what was asked for.
-        let mut verdicts = self.judge_seen(view, &self.described, &asked)?.0;
+        let mut verdicts = self.judge_seen(view, &self.described, &asked)?.verdicts;
         let mut revised = Vec::new();
         for (tile, (verdict, enough)) in asked.iter().zip(&verdicts) {
             let shows = || unmet.shown(view.film, view.display, *tile).is_some();
