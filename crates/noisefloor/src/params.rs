@@ -154,7 +154,7 @@ pub struct Params {
     /// When tiles are judged.
     pub schedule: Schedule,
     /// Fewest samples per pixel at which a tile may stop. Below 100, the oracle stops only tiles whose noise is
-    /// spread over many pixels. More find more of the light that is seldom found.
+    /// spread over many pixels, in pictures of two million samples. More find more of the light that is seldom found.
     pub min_spp: u64,
     /// Samples per pixel at which every tile stops (Takouachet et al. 2017, §4.2.1: 10,000).
     pub max_spp: u64,
