@@ -89,8 +89,8 @@ pub struct Verdict {
     /// then, however undemanding. `converged` is false, and `expected_spp` where that changes at the latest,
     /// or later.
     pub doubted: bool,
-    /// Whether the tile is open for light that it has not met: what only one half of the samples has met elsewhere
-    /// would be seen here if as much of it fell on this tile as is likely. Without that, it would be done.
+    /// Whether the tile is open only for light that it may not have met: of what one half of the samples alone has
+    /// met elsewhere, as much as is likely to be missing here would be seen.
     pub unmet: bool,
     /// Whether the tile is unlike everything the criterion was made for: treat the verdict with care.
     pub unfamiliar: bool,
@@ -228,9 +228,9 @@ pub trait StoppingCriterion {
     /// [`CriterionError`] if the criterion does not fit the job.
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError>;
 
-    /// New verdicts on tiles that the last [`StoppingCriterion::judge`] was not asked about, where what it found makes
-    /// earlier ones untrue; each is returned once. A tile that had converged by one of these is open again. None, the
-    /// default, if verdicts look at nothing but their tiles.
+    /// New verdicts on tiles that the last [`StoppingCriterion::judge`] was not asked about, where what it found
+    /// makes earlier ones untrue; each is returned once, and none has converged. A session opens such tiles again.
+    /// None, the default, if verdicts look at nothing but their tiles.
     fn revised(&mut self) -> Vec<(Tile, Verdict)> {
         Vec::new()
     }

@@ -22,8 +22,9 @@ const NO_EVIDENCE: usize = 16;
 /// Samples per pixel from which noise is trusted however it is distributed, and whatever the size of the picture.
 const TRUSTED_SPP: u64 = 100;
 
-/// Samples of a picture from which it is trusted sooner: in fewer, light that makes up a tenth of a picture is too often
-/// met by none. Pictures from 362×362 pixels on have them at the first verdict (docs/benchmarks/unmet.md).
+/// Samples of a picture from which it is trusted sooner: in fewer, light that makes up a tenth of a picture is
+/// too often met by none. Pictures from 362×362 pixels on have them at the first verdict
+/// (docs/benchmarks/unmet.md).
 const TRUSTED_SAMPLES: u64 = 1 << 21;
 
 /// Share of the pixels of a tile that have to carry its noise for it to be trusted sooner.
@@ -38,10 +39,12 @@ const MORE: f64 = 1.25;
 /// Judges tiles by a trained model.
 ///
 /// In a session, a tile with fewer than 100 samples per pixel is not called converged unless its noise is spread
-/// over many pixels, and the picture has two million samples: noise that a few samples have made is not known yet, and
-/// neither is light that no sample has found. A tile is not called converged either while light would be seen in it that
-/// only one half of the samples has met in its neighbours or in the picture, if as much of that were missing here as is
-/// likely ([`Verdict::unmet`]). Where that is found later, it takes its verdict back.
+/// over many pixels, and the picture has two million samples: noise that a few samples have made is not known
+/// yet, and neither is light that no sample has found.
+///
+/// What only one half of the samples has met around a tile, or in its picture, tells how much light the tile is
+/// likely to lack. While that would be seen, it is not called converged ([`Verdict::unmet`]); where it is found
+/// later, the verdict is taken back ([`StoppingCriterion::revised`]).
 #[derive(Clone, Debug)]
 pub struct Oracle {
     model: Model,
@@ -62,7 +65,7 @@ struct LastDescribed {
     spread: f32,
     /// What only one half has met in it.
     met_once: MetOnce,
-    /// Mean radiance that it may have lacked where nobody would have seen it; `None` while it has noise to be seen.
+    /// Mean radiance that it may have lacked, and nobody would have seen; `None` while it is not done.
     lacked: Option<f64>,
 }
 
@@ -266,7 +269,8 @@ impl Oracle {
         described.map(|tile| Some(LastDescribed { tile, spread, met_once, lacked: None }))
     }
 
-    /// Judges tiles of a picture: those that only light could keep open, with the light that they are likely to lack.
+    /// Judges tiles of a picture: those that only light could keep open, with the light that they are likely to
+    /// lack.
     fn judge_seen(
         &self,
         view: &View<'_>,
@@ -342,8 +346,8 @@ impl Oracle {
         tiles.par_iter().map(judge).collect()
     }
 
-    /// Whether a verdict is all that this audience asks for, or will be said to be: fewer samples are enough for a less
-    /// demanding one.
+    /// Whether a verdict is all that this audience asks for; a session stops tiles for less demanding ones where
+    /// their need is expected to be met.
     fn is_enough(&self, view: &View<'_>, verdict: &Verdict, spp: u64) -> bool {
         let audience = self.audience().then(view.audience);
         let sooner = audience.slope < 1.0 && !verdict.doubted;

@@ -1,19 +1,22 @@
 //! Light that no sample has met yet, estimated from light that only one half of the samples has met.
 //!
-//! A lamp behind glass may be met by one sample in a million. Until then a tile shows nothing of it, and no noise tells
-//! of it either. But what was seen once estimates what was not seen yet (Good 1953, "The population frequencies of
-//! species and the estimation of population parameters", eq. 9, after Turing): light that `n` samples have met once
-//! makes up as much of the picture, on average, as light that they have missed, wherever that is.
+//! A lamp behind glass may be met by one sample in a million. Until then a tile shows nothing of it, and no
+//! noise tells of it either. But what was seen once estimates what was not seen yet (Good 1953, "The
+//! population frequencies of species and the estimation of population parameters", after Turing):
+//! light that `n` samples have met once makes up as much of the picture, on average, as light that they have
+//! missed, wherever that is.
 //!
-//! Met once is what one half of the film has at a pixel and the other half has nowhere within a pixel of it. Of ordinary
-//! noise, that is hardly anything: the largest of nine values of the other half is exceeded one time in ten, by a
-//! little, everywhere. How much of it is missing in a place that has less of it than its surroundings hangs on how many
-//! finds make it up: m, on average, in the samples of a place as large as people look at. With rates of finding it that are
-//! exponentially distributed from place to place, of mean m, a place without a find is expected to have a rate of
-//! m/(1 + m) (the mean of the posterior of Poisson counts, a gamma distribution): where finds are many, a place that has
-//! none lacks one at the most, and a single one may lie anywhere.
+//! Met once is what one half of the film has at a pixel and the other half has nowhere within a pixel of it.
+//! Of ordinary noise, that is hardly anything: the largest of nine values of the other half is exceeded one
+//! time in ten, by a little, everywhere. How much of it is missing in a place that has less of it than its
+//! surroundings hangs on how many finds make it up: m, on average, in the samples of a place as large as
+//! people look at. With rates of finding it that are exponentially distributed from place to place, of mean
+//! m, a place without a find is expected to have a rate of m/(1 + m) (the mean of the posterior of Poisson
+//! counts, a gamma distribution): where finds are many, a place that has none lacks one at the most, and a
+//! single one may lie anywhere.
 //!
-//! Whether so much light would be seen if it fell on a tile is for the criterion to say: [`Unmet::shown`] draws it.
+//! Whether so much light would be seen if it fell on a tile is for the criterion to say: [`Unmet::shown`]
+//! draws it.
 
 use crate::display::{Display, luminance};
 use crate::evidence::TilePlanes;
@@ -100,8 +103,8 @@ impl MetOnce {
         self.light / self.pixels.max(1.0)
     }
 
-    /// How much of this light is likely to be missing, for each pixel, where `own` is what was met in `spp` samples of
-    /// each pixel, and a place has so many pixels.
+    /// How much of this light is likely to be missing, for each pixel, where `own` is what was met in `spp`
+    /// samples of each pixel, and a place has so many pixels.
     fn missing(self, own: Self, spp: f64, place: f64) -> f64 {
         if self.light <= 0.0 {
             return 0.0;
@@ -192,7 +195,8 @@ impl<'a> Unmet<'a> {
     }
 
     /// What this would change on the screen if it fell on the tile and all around it, in places as large as
-    /// people look at: the residual of luminance Y′, in the shape of the tile's planes. `None` if that is nothing.
+    /// people look at: the residual of luminance Y′, in the shape of the tile's planes. `None` if that is
+    /// nothing.
     pub(crate) fn shown(&self, film: &Film, display: &Display, tile: Tile) -> Option<Array2<f32>> {
         let light = self.light(film, tile);
         let most = (PEAK * light) as f32;

@@ -65,9 +65,10 @@ fn one_find_may_lie_anywhere_around_it_and_in_the_picture() {
     }
 }
 
-/// As Good and Turing have it: what was met once makes up as much as what was not met. Samples find light at a random
-/// place out of 4096, each as often as another, in both halves; what one half alone has is, on average, what a third
-/// one would bring that the other has not. Places are apart, so that no find hides another.
+/// As Good and Turing have it: what was met once makes up as much as what was not met. Samples find light at
+/// a random place out of 4096, each as often as another, in both halves; what one half alone has is, on
+/// average, what a third one would bring that the other has not. Places are apart, so that no find hides
+/// another.
 #[test]
 fn what_was_met_once_is_as_much_as_what_was_not_met() {
     let mut noise = Noise::new(11);
@@ -89,8 +90,8 @@ fn what_was_met_once_is_as_much_as_what_was_not_met() {
     // Of either half, the mean has a half
     let once: f64 = 2.0 * all(&film).iter().flatten().map(|m| m.light).sum::<f64>();
     let ratio = once / (finds as f64 * (unmet + unmet_by_b));
-    // Neighbours in the corners of 3×3 are two pixels away: none is hidden; more finds than the other half adds 6 %.
-    // 1,000 of the finds count, known to 3 %
+    // Neighbours in the corners of 3×3 are two pixels away: none is hidden; more finds than the other half
+    // adds 6 %. 1,000 of the finds count, known to 3 %
     assert!((0.95..1.2).contains(&ratio), "{ratio}");
 }
 
@@ -101,7 +102,8 @@ fn ordinary_noise_hides_nothing() {
             let halves = [1, 2].map(|seed| noisy(seed, samples, spread));
             let most = most(&film([&halves[0], &halves[1]], [samples; 2]));
             let noise = spread / (2.0 * samples as f64).sqrt();
-            // In sixty synthetic pictures it was a five-thousandth of the noise at the most (docs/benchmarks/unmet.md)
+            // In sixty synthetic pictures it was a five-thousandth of the noise at the most
+            // (docs/benchmarks/unmet.md)
             assert!(most < 1e-3 * noise.max(1e-9), "{samples}, {spread}: {most} with noise of {noise}");
         }
     }
@@ -173,7 +175,8 @@ fn session(max_spp: u64) -> Session<Oracle> {
     Session::new(EDGE, EDGE, Oracle::bundled(), params).unwrap()
 }
 
-/// Without rare light, tiles stop; with a tenth of the light in one sample of 400,000, none does that has not found it.
+/// Without rare light, tiles stop; with a tenth of the light in one sample of 400,000, none does that has
+/// not found it.
 #[cfg(feature = "bundled-model")]
 #[test]
 fn no_tile_is_done_while_light_is_unmet_that_would_be_seen() {
@@ -194,12 +197,13 @@ fn no_tile_is_done_while_light_is_unmet_that_would_be_seen() {
         assert!(without.stops().all(|s| s.reason == crate::StopReason::Converged && s.spp < 200), "{seed}");
         assert!((0..16).all(|tile| !without.verdict(tile).unwrap().unmet), "seed {seed}");
     }
-    // Some five finds lie in 16 tiles at the first verdict that counts; those without are open for that reason alone
+    // Some five finds lie in 16 tiles at the first verdict that counts; those without are open for that
+    // reason alone
     assert!(for_light > 10, "{for_light}");
 }
 
-/// Light that is found late opens tiles again that had stopped without it; and a session resumed at any verdict goes
-/// on as one that was not interrupted, to the bit.
+/// Light that is found late opens tiles again that had stopped without it; and a session resumed at any
+/// verdict goes on as one that was not interrupted, to the bit.
 #[cfg(feature = "bundled-model")]
 #[test]
 fn what_is_found_late_opens_what_had_stopped() {
