@@ -1,6 +1,8 @@
 //! The state that directives change, and what they define.
 
+use super::lights::AreaLight;
 use super::params::Params;
+use crate::colour::ColourSpace;
 use crate::error::Place;
 use crate::mesh::Triangles;
 use glam::DMat4;
@@ -15,8 +17,10 @@ pub(super) struct State {
     /// From the coordinates of what comes next to the world.
     pub(super) to_world: DMat4,
     pub(super) material: Look,
-    pub(super) area_light: Option<Rc<Params>>,
+    pub(super) area_light: Option<Rc<AreaLight>>,
     pub(super) reversed: bool,
+    /// Of the colours that come.
+    pub(super) colour_space: ColourSpace,
     /// Whether a medium is on either side of the surfaces that come.
     pub(super) in_medium: bool,
     /// Parameters that `Attribute` adds to all that come: by what they are for.
@@ -96,6 +100,7 @@ impl State {
             material: Look::Given(Rc::new(diffuse)),
             area_light: None,
             reversed: false,
+            colour_space: ColourSpace::default(),
             in_medium: false,
             defaults: HashMap::new(),
             float_textures: Rc::default(),
