@@ -5,7 +5,9 @@
 // is open.
 //
 // Errors. Every function that can fail returns an NfStatus, and writes its results through pointers only if
-// that is NF_STATUS_OK. nf_last_error says what was wrong. No function throws or unwinds into the caller. An
+// that is NF_STATUS_OK. nf_last_error says what was wrong. No function throws or unwinds into the caller.
+// A function of yours that this library calls must not throw or jump out either: an exception that leaves it ends the
+// program (std::terminate); catch it there, and return what is not 0. An
 // error inside the library is NF_STATUS_INTERNAL, also reported on standard error; the session it happened in
 // answers NF_STATUS_INTERNAL from then on and can only be freed. A picture that there is no memory for is
 // NF_STATUS_MEMORY; where the system has not even a few megabytes left, the process ends.
