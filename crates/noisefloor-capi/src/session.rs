@@ -391,9 +391,8 @@ unsafe fn of_tiles<T>(
     guard(|| {
         let session = handle::get(session)?;
         // SAFETY: promised by the caller, but for the values, which need not be any before.
-        let room = unsafe {
-            border::room::<MaybeUninit<T>>(values.cast(), capacity, session.grid.len(), name)
-        }?;
+        let room =
+            unsafe { border::room::<MaybeUninit<T>>(values.cast(), capacity, session.grid.len(), name) }?;
         let judged = session.lock()?;
         let record = judged.record.as_ref();
         let record =
