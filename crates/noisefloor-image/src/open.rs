@@ -1,8 +1,8 @@
 //! Opening files that may be hostile: what the decoders share.
 
 use crate::error::PictureError;
-use crate::read::ReadOptions;
 use noisefloor::internal::{check_image, stand_in};
+use noisefloor::viewing::Viewing;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,6 +11,25 @@ use std::path::Path;
 /// Longest file that is read, in bytes: enough for an EXR of [`noisefloor::tile::MAX_PIXELS`] pixels in 32-bit
 /// floats.
 pub const MAX_FILE_BYTES: u64 = 1 << 32;
+
+/// How a picture is read.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// The display that it is to be shown on. It takes the codes of a PNG that states no colours, states sRGB, or
+    /// states what the display takes, such as PQ; all others are converted to sRGB if it takes that.
+    pub viewing: Viewing,
+    /// Most pixels: a larger picture is refused before any pixel is allocated.
+    pub most_pixels: usize,
+    /// The layer of an EXR: its name, as in `ViewLayer.Combined`, or the end of it, as in `Combined`; capitals do not
+    /// matter. Without it, see [`read_exr`](crate::read_exr).
+    pub layer: Option<String>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self { viewing: Viewing::default(), most_pixels: noisefloor::tile::MAX_PIXELS, layer: None }
+    }
+}
 
 /// The format that the first bytes announce.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -2,30 +2,11 @@
 
 use crate::error::PictureError;
 use crate::facts::read_facts;
-use crate::open::{Format, Opened};
+use crate::open::{Format, Opened, ReadOptions};
 use crate::picture::Picture;
 use crate::{decode_exr, decode_pfm, decode_png};
-use noisefloor::{stills::Still, viewing::Viewing};
+use noisefloor::stills::Still;
 use std::path::Path;
-
-/// How a picture is read.
-#[derive(Clone, Debug)]
-pub struct ReadOptions {
-    /// The display that it is to be shown on. It takes the codes of a PNG that states no colours, states sRGB, or
-    /// states what the display takes, such as PQ; all others are converted to sRGB if it takes that.
-    pub viewing: Viewing,
-    /// Most pixels: a larger picture is refused before any pixel is allocated.
-    pub most_pixels: usize,
-    /// The layer of an EXR: its name, as in `ViewLayer.Combined`, or the end of it, as in `Combined`; capitals do not
-    /// matter. Without it, see [`read_exr`](crate::read_exr).
-    pub layer: Option<String>,
-}
-
-impl Default for ReadOptions {
-    fn default() -> Self {
-        Self { viewing: Viewing::default(), most_pixels: noisefloor::tile::MAX_PIXELS, layer: None }
-    }
-}
 
 /// Reads an EXR, PFM or PNG file. Its first bytes tell the format; its name does not matter.
 ///

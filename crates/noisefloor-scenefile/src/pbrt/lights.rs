@@ -3,33 +3,14 @@
 use super::environment;
 use super::params::Params;
 use super::reader::Reader;
-use crate::error::{LoadError, Place};
+use super::state::AreaLight;
+use crate::error::LoadError;
 use crate::picture::{self, Samples};
 use glam::{DMat3, DVec3};
 use noisefloor::Rgb;
 use noisefloor::display::{luminance, srgb_decode};
 use noisefloor_ptwne::{Emission, Environment, Falloff, ImageTexture, Pixels, Punctual, Texture, Wrap};
 use std::f64::consts::PI;
-
-/// What an `AreaLightSource` says of the shapes that come.
-#[derive(Clone, Debug)]
-pub(super) struct AreaLight {
-    pub(super) emission: Emission,
-    /// What the radiance is to be multiplied with, times the area of the shape, if it is to have a power.
-    pub(super) power: Option<f64>,
-}
-
-impl AreaLight {
-    /// The emission of a shape of that area.
-    pub(super) fn of_area(&self, area: f64, place: &Place) -> Result<Emission, LoadError> {
-        let Some(power) = self.power else { return Ok(self.emission.clone()) };
-        let radiance = self.emission.radiance.map(|c| (f64::from(c) * power / area) as f32);
-        if !radiance.iter().all(|c| c.is_finite()) {
-            return Err(place.clone().bad("`power` needs a shape that has an area"));
-        }
-        Ok(Emission { radiance, ..self.emission.clone() })
-    }
-}
 
 impl Reader<'_> {
     /// Adds a `LightSource`.

@@ -1,8 +1,9 @@
 //! Colour look-up tables as the text of `.cube` files (Adobe, "Cube LUT Specification 1.0", and Resolve's 1D before 3D).
 
 use crate::display::lut::{ColourLut, LutTable};
-use crate::internal::{lines, stand_in, text};
+
 use crate::rgb::Rgb;
+use crate::text::{lines, stand_in, text};
 use thiserror::Error;
 
 /// Entries along one edge.
