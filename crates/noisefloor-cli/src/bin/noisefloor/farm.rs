@@ -14,8 +14,8 @@ use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::sources::{Resources, SourceKind};
 use noisefloor_cli::{note, say};
 use noisefloor_farm::{
-    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameSource, FrameState, Frames,
-    News, RenderFiles, Round, Slurm, Studio, StudioError, merge_shards,
+    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameSource, FrameState, Frames, News,
+    RenderFiles, Round, Slurm, Studio, StudioError, merge_shards,
 };
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
