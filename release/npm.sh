@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the package for npm from the work tree: release/npm.sh FOLDER [--debian]. The second word goes to
 # build.sh of crates/noisefloor-capi/js. The package is installed into an empty folder at last, and judges a
-# tile there.
+# tile there; and into the newest template of Vite, in which TypeScript compiles the README's snippet by strict options.
 set -euo pipefail
 folder=$(mkdir -p "$1" && cd "$1" && pwd)
 js=$(cd "$(dirname "$0")/../crates/noisefloor-capi/js" && pwd)
@@ -37,4 +37,10 @@ const { version: packed } = JSON.parse(readFileSync("node_modules/noisefloor/pac
 const isRight = reason === "converged" && version() === packed;
 if (!isRight) throw new Error(`${reason} at ${spp}, ${version()} in ${packed}`);
 '
+npx --yes create-vite@latest app --template vanilla-ts --no-interactive >/dev/null
+cd app
+npm install --silent --no-audit --no-fund --ignore-scripts "$folder/$file"
+rm -r src/*
+node "$js/test/readme.mjs" >src/main.ts
+npx tsc --project . --strict --noUncheckedIndexedAccess --exactOptionalPropertyTypes
 echo "$folder/$file"

@@ -5,7 +5,9 @@
 // is open.
 //
 // Errors. Every function that can fail returns an NfStatus, and writes its results through pointers only if
-// that is NF_STATUS_OK. nf_last_error says what was wrong. No function throws or unwinds into the caller. An
+// that is NF_STATUS_OK. nf_last_error says what was wrong. No function throws or unwinds into the caller.
+// A function of yours that this library calls must not throw or jump out either: an exception that leaves it ends the
+// program (std::terminate); catch it there, and return what is not 0. An
 // error inside the library is NF_STATUS_INTERNAL, also reported on standard error; the session it happened in
 // answers NF_STATUS_INTERNAL from then on and can only be freed. A picture that there is no memory for is
 // NF_STATUS_MEMORY; where the system has not even a few megabytes left, the process ends.
@@ -177,7 +179,7 @@ typedef struct {
 
 // Denoises a whole picture, noisy, into denoised: each has 3 * width * height floats. albedo and normal are NULL, or
 // as large. What it writes hangs on these arguments alone. Returns 0, or anything else if it failed. It cannot use
-// sessions.
+// sessions, and must not throw: an exception that leaves it ends the program.
 typedef int32_t (*NfDenoise)(void *user,
                              uint32_t width,
                              uint32_t height,
@@ -259,6 +261,7 @@ typedef struct {
 
 // Renders the mean of spp new samples of each pixel of a tile, of which it has rendered first samples before:
 // mean has room for 3 * width * height floats of the tile. Returns 0, or anything else if it failed.
+// It must not throw: an exception that leaves it ends the program.
 typedef int32_t (*NfRender)(void *user, NfTile tile, uint64_t first, uint64_t spp, float *mean);
 
 // What to do next in a search, or how it ended.
@@ -361,7 +364,7 @@ size_t nf_session_tile_count(const NfSession *session);
 // Where a tile lies.
 NfStatus nf_session_tile(const NfSession *session, size_t index, NfTile *tile);
 
-// What the open tiles need next, into an array for as many requests as there are tiles (capacity says how
+// What the open tiles need next, into an array for at least as many requests as there are tiles (capacity says how
 // many). count becomes the number of requests: 0 when all tiles are done.
 NfStatus nf_session_requests(const NfSession *session,
                              NfRequest *requests,
@@ -396,13 +399,15 @@ NfStatus nf_session_set_tone_table(const NfSession *session,
                                    size_t edge);
 
 // Just-objectionable differences that each tile to be shown has lost, by its last verdict: a double for each tile, NaN
-// before the first. NF_STATUS_UNAVAILABLE if the session has no denoiser.
+// before the first, into an array for at least as many (capacity says how many). NF_STATUS_UNAVAILABLE if the session
+// has no denoiser.
 NfStatus nf_session_jods_lost(const NfSession *session,
                               double *lost,
                               size_t capacity);
 
 // Which tiles are to be shown as rendered instead of denoised: their noise has lost no more than is allowed, and what the
-// denoiser makes of them has. A bool for each tile; false before the first verdict. NF_STATUS_UNAVAILABLE if the session
+// denoiser makes of them has. A bool for each tile, into an array for at least as many (capacity says how
+// many); false before the first verdict. NF_STATUS_UNAVAILABLE if the session
 // has no denoiser.
 NfStatus nf_session_undenoised(const NfSession *session,
                                bool *undenoised,
@@ -531,7 +536,7 @@ NfStatus nf_background_finish(const NfBackground *background);
 // nf_background_finish before. NULL is ignored, a second time is NF_STATUS_HANDLE.
 NfStatus nf_background_end(NfBackground *background);
 
-// Where all tiles stand, in their order, into an array for as many states as there are tiles (capacity says
+// Where all tiles stand, in their order, into an array for at least as many states as there are tiles (capacity says
 // how many).
 NfStatus nf_session_states(const NfSession *session,
                            NfTileState *states,

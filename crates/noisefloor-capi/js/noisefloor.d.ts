@@ -1,3 +1,4 @@
+/// <reference lib="esnext.disposable" />
 /** noisefloor tells a progressive renderer, tile by tile, when people stop seeing noise. */
 
 /**

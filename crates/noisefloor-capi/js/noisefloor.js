@@ -345,6 +345,27 @@ const position = (names, name, what) => {
 };
 
 /** Options by the names of the header. Those not given keep the defaults of Rust. */
+/** What a session can be told; a slip of the pen would leave the default in place. */
+const OPTIONS = {
+  "": [
+    ...["people", "tile", "schedule", "step", "minSpp", "maxSpp", "consecutive", "audience", "viewing"],
+    ...["toneMapping", "sharedPixels", "onWarning"],
+  ],
+  audience: ["slope", "offset"],
+  toneMapping: ["curve", "exposure", "key", "white"],
+};
+
+/** Refuses what is not among `OPTIONS`. */
+function known(options) {
+  for (const [group, names] of Object.entries(OPTIONS)) {
+    const given = group ? options[group] : options;
+    const wrong = Object.keys(given ?? {}).find((name) => !names.includes(name));
+    if (wrong === undefined) continue;
+    const path = group ? `${group}.${wrong}` : wrong;
+    throw new NoisefloorError("ARGUMENT", `there is no option ${path}; there are ${names.join(", ")}`);
+  }
+}
+
 function fields({ tile, schedule, step, minSpp, maxSpp, consecutive, audience, toneMapping }) {
   const linear = toneMapping?.curve === "linear";
   return {
@@ -382,6 +403,7 @@ export class Session {
   }
 
   constructor(width, height, options = {}) {
+    known(options);
     this.width = width;
     this.height = height;
     this.#onWarning = options.onWarning ?? ((text) => console.warn(`noisefloor: ${text}`));

@@ -10,6 +10,7 @@ use std::ffi::c_void;
 
 /// Renders the mean of spp new samples of each pixel of a tile, of which it has rendered first samples before:
 /// mean has room for 3 * width * height floats of the tile. Returns 0, or anything else if it failed.
+/// It must not throw: an exception that leaves it ends the program.
 pub type NfRender = Option<
     unsafe extern "C" fn(user: *mut c_void, tile: NfTile, first: u64, spp: u64, mean: *mut f32) -> i32,
 >;

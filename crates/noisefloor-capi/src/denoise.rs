@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// Denoises a whole picture, noisy, into denoised: each has 3 * width * height floats. albedo and normal are NULL, or
 /// as large. What it writes hangs on these arguments alone. Returns 0, or anything else if it failed. It cannot use
-/// sessions.
+/// sessions, and must not throw: an exception that leaves it ends the program.
 pub type NfDenoise = Option<
     unsafe extern "C" fn(
         user: *mut c_void,

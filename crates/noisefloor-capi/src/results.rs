@@ -49,7 +49,7 @@ fn reason_code(reason: StopReason) -> u32 {
     }
 }
 
-/// Where all tiles stand, in their order, into an array for as many states as there are tiles (capacity says
+/// Where all tiles stand, in their order, into an array for at least as many states as there are tiles (capacity says
 /// how many).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_states(
@@ -60,7 +60,7 @@ pub unsafe extern "C" fn nf_session_states(
     guard(|| {
         let session = handle::get(session)?;
         // SAFETY: promised by the caller.
-        let room = unsafe { border::array_mut(states, capacity, session.grid.len(), "states") }?;
+        let room = unsafe { border::room(states, capacity, session.grid.len(), "states") }?;
         let locked = session.lock()?;
         for (tile, state) in room.iter_mut().enumerate() {
             let verdict = locked.verdict(tile);

@@ -268,7 +268,7 @@ pub unsafe extern "C" fn nf_session_tile(
     })
 }
 
-/// What the open tiles need next, into an array for as many requests as there are tiles (capacity says how
+/// What the open tiles need next, into an array for at least as many requests as there are tiles (capacity says how
 /// many). count becomes the number of requests: 0 when all tiles are done.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_requests(
@@ -280,7 +280,7 @@ pub unsafe extern "C" fn nf_session_requests(
     guard(|| {
         let session = handle::get(session)?;
         // SAFETY: promised by the caller.
-        let room = unsafe { border::array_mut(requests, capacity, session.grid.len(), "requests") }?;
+        let room = unsafe { border::room(requests, capacity, session.grid.len(), "requests") }?;
         let wanted = session.lock()?.requests();
         // SAFETY: promised by the caller.
         unsafe { border::write(count, wanted.len(), "count") }?;
@@ -347,7 +347,8 @@ pub unsafe extern "C" fn nf_session_set_tone_table(
 }
 
 /// Just-objectionable differences that each tile to be shown has lost, by its last verdict: a double for each tile, NaN
-/// before the first. NF_STATUS_UNAVAILABLE if the session has no denoiser.
+/// before the first, into an array for at least as many (capacity says how many). NF_STATUS_UNAVAILABLE if the session
+/// has no denoiser.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_jods_lost(
     session: *const NfSession,
@@ -363,7 +364,8 @@ pub unsafe extern "C" fn nf_session_jods_lost(
 }
 
 /// Which tiles are to be shown as rendered instead of denoised: their noise has lost no more than is allowed, and what the
-/// denoiser makes of them has. A bool for each tile; false before the first verdict. NF_STATUS_UNAVAILABLE if the session
+/// denoiser makes of them has. A bool for each tile, into an array for at least as many (capacity says how
+/// many); false before the first verdict. NF_STATUS_UNAVAILABLE if the session
 /// has no denoiser.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_undenoised(
@@ -389,9 +391,8 @@ unsafe fn of_tiles<T>(
     guard(|| {
         let session = handle::get(session)?;
         // SAFETY: promised by the caller, but for the values, which need not be any before.
-        let room = unsafe {
-            border::array_mut::<MaybeUninit<T>>(values.cast(), capacity, session.grid.len(), name)
-        }?;
+        let room =
+            unsafe { border::room::<MaybeUninit<T>>(values.cast(), capacity, session.grid.len(), name) }?;
         let judged = session.lock()?;
         let record = judged.record.as_ref();
         let record =

@@ -528,6 +528,10 @@ fn sizes_tiles_and_parameters_are_checked() {
         assert_eq!(nf_session_push(s, 0, 0, mean.as_ptr(), whole), Batch);
         assert_eq!(nf_session_states(s, [NfTileState::default(); 8].as_mut_ptr(), 8), Size);
         assert_eq!(nf_session_tile(s, 9, &mut NfTile::default()), Batch);
+        // Arrays may be longer than they need to be
+        let (mut states, mut requests) = ([NfTileState::default(); 12], [NfRequest::default(); 12]);
+        assert_eq!(nf_session_states(s, states.as_mut_ptr(), 12), NfStatus::Ok);
+        assert_eq!(nf_session_requests(s, requests.as_mut_ptr(), 12, &mut 0), NfStatus::Ok);
         assert_eq!(nf_session_requests(s, [NfRequest::default(); 8].as_mut_ptr(), 8, &mut 0), Size);
         assert_eq!(nf_session_image(s, out.as_mut_ptr(), 4), Size);
         assert_eq!(nf_session_visible_noise(s, out.as_mut_ptr(), 4), Size);

@@ -2,6 +2,7 @@
 
 pub mod denoiser;
 pub mod eyes;
+pub mod layer;
 pub mod oracle;
 pub mod renderer;
 pub mod scenes;

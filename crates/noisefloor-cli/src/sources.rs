@@ -5,9 +5,10 @@ mod adapters;
 pub use adapters::{ADAPTERS, Adapter};
 
 use crate::build::program_digest;
+use crate::end::Usage;
 use crate::refuse;
 use crate::say::note;
-use crate::spell::{JobPath, as_typed};
+use crate::spell::{JobPath, as_typed, with_frame};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use noisefloor::{ProgressiveSource, Rgb, Schedule, Tile, stills::SampleOrigin};
@@ -15,7 +16,7 @@ use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
 };
-use noisefloor_scenefile::{LoadOptions, Loaded, group_warnings};
+use noisefloor_scenefile::{LoadError, LoadOptions, Loaded, group_warnings};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
@@ -41,6 +42,9 @@ pub struct SourceJob {
     /// Of a sequence: whether all frames have that seed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub same_seed: bool,
+    /// Of a scene file that holds all frames: which one is rendered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<i32>,
     pub size: Option<(usize, usize)>,
     pub max_depth: Option<u32>,
     /// How the built-in renderer loads scene files.
@@ -218,28 +222,49 @@ impl SourceJob {
         Ok(all)
     }
 
-    /// The source of a frame of a sequence: {frame} is filled in in the name of the scene and in values of
-    /// its parameters. The frame has a seed of its own, whatever other frames there are, unless all have the same.
+    /// The source of a frame of a sequence: its number is filled in in the name of the scene, in values of its
+    /// parameters and in the command; a scene file that holds all frames is told. The frame has a seed of its own,
+    /// whatever other frames there are, unless all have the same.
     #[must_use]
-    pub fn of_frame(&self, frame: u32) -> Self {
+    pub fn of_frame(&self, frame: i32) -> Self {
         let seed = if self.same_seed { self.seed } else { seed_of_frame(self.seed, frame) };
         let scene = self.scene.as_ref().map(|scene| scene.of_frame(frame));
-        let mut one = Self { scene, seed, same_seed: false, ..self.clone() };
-        for value in one.scene_files.parameters.values_mut() {
-            *value = JobPath::from(&*value).of_frame(frame).to_string_lossy().into_owned();
+        let whole = self.holds_all_frames() && scene == self.scene;
+        let mut one = Self { scene, seed, same_seed: false, frame: whole.then_some(frame), ..self.clone() };
+        let command = if let SourceKind::Command(template) = &mut one.kind { Some(template) } else { None };
+        for value in one.scene_files.parameters.values_mut().chain(command) {
+            if let Some(filled) = with_frame(value, frame) {
+                *value = filled;
+            }
         }
         one
     }
 
-    /// Whether the name of the scene says which frame it is of; what is in front of that.
+    /// Whether the renderer can be told which frame of a scene file it is to render.
+    fn holds_all_frames(&self) -> bool {
+        matches!(self.kind, SourceKind::Adapter(adapter) if adapter.frames)
+    }
+
+    /// Whether the job says where the number of a frame stands; a name for the sequence.
     pub fn check_frames(&self) -> anyhow::Result<PathBuf> {
-        let Some(scene) = &self.scene else {
-            refuse!("--frames needs a scene with {{frame}} in its name, as in 'hall.{{frame:04}}.xml'")
-        };
-        let Some(before) = scene.before_frame() else {
-            refuse!("--frames: '{}' does not hold {{frame}} or {{frame:04}} once", scene.display())
-        };
-        Ok(before)
+        let command = if let SourceKind::Command(template) = &self.kind { Some(template) } else { None };
+        let mut values = self.scene_files.parameters.values().chain(command);
+        let in_values = values.any(|value| with_frame(value, 0).is_some());
+        let before = self.scene.as_ref().and_then(JobPath::before_frame);
+        match (&self.scene, before) {
+            (_, Some(before)) => Ok(before),
+            (Some(scene), None) if in_values || self.holds_all_frames() => Ok(scene.with_extension("")),
+            (None, None) if in_values => Ok(PathBuf::new()),
+            (Some(scene), None) => refuse!(
+                "--frames: '{}' does not say where the number of the frame stands: write {{frame}} or {{frame:04}} \
+                 there, once (####, %04d and $F4 do, too), or into a value of --define. One .blend file holds all \
+                 frames, with --source cycles",
+                scene.display()
+            ),
+            (None, None) => {
+                refuse!("--frames needs a scene with {{frame}} in its name, as in 'hall.{{frame:04}}.xml'")
+            }
+        }
     }
 
     /// Where samples come from, for the picture's file; none for pictures that are played back. What else
@@ -297,7 +322,7 @@ impl SourceJob {
 
 /// The seed of a frame. Scattered, since some renderers derive related random numbers from neighbouring seeds; of as
 /// many bits as all languages take for an integer.
-fn seed_of_frame(seed: u64, frame: u32) -> u64 {
+fn seed_of_frame(seed: u64, frame: i32) -> u64 {
     let mut words = [0; 12];
     words[..8].copy_from_slice(&seed.to_le_bytes());
     words[8..].copy_from_slice(&frame.to_le_bytes());
@@ -322,7 +347,36 @@ fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
              lists the scenes"
         );
     }
-    Ok(noisefloor_scenefile::load_with(path, options)?)
+    noisefloor_scenefile::load_with(path, options).map_err(|error| match (&error, elsewhere(path)) {
+        (LoadError::Format { .. }, Some(advice)) => Usage(format!("{}: {advice}", path.display())).into(),
+        _ => error.into(),
+    })
+}
+
+/// What to type for a file that the built-in renderer does not read, if that is known.
+fn elsewhere(path: &Path) -> Option<&'static str> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    Some(match ending.as_str() {
+        "blend" => "Blender's files are rendered by Cycles: add --source cycles",
+        "py" => "scripts that build a scene in Blender are rendered by Cycles: add --source cycles",
+        "cfg" | "scn" => "LuxCore's files are rendered by LuxCore: add --source luxcore",
+        "lxs" | "lxm" | "lxo" => {
+            "files of the old LuxRender are read by no source; BlendLuxCore and LuxCore write .cfg and .scn, \
+             which --source luxcore reads"
+        }
+        "obj" | "fbx" | "dae" | "stl" | "ply" | "abc" | "usd" | "usda" | "usdc" | "usdz" | "3ds" | "x3d" => {
+            "this is a model, which Blender imports: save it from there as .glb, or as .blend for --source cycles"
+        }
+        "ass" | "rib" | "mi" | "ifd" | "vrscene" | "max" | "ma" | "mb" | "c4d" | "hip" | "hiplc"
+        | "hipnc" => {
+            "files of this program are read by no source: render with the program itself, \
+             --source 'command: PROGRAM …', or export the scene as glTF (.glb)"
+        }
+        "exr" | "pfm" | "png" | "jpg" | "jpeg" | "hdr" => {
+            "this is a picture: `noisefloor judge` looks at pictures, and --source exr plays back a folder of them"
+        }
+        _ => return None,
+    })
 }
 
 /// Letters to add, leave out or replace to make one word of the other (Levenshtein 1966).
@@ -353,7 +407,7 @@ mod tests {
 
     #[test]
     fn frames_have_seeds_of_their_own() {
-        let seeds = (1..4).flat_map(|seed| (0..5000).map(move |frame| seed_of_frame(seed, frame)));
+        let seeds = (1..4).flat_map(|seed| (-2500..2500).map(move |frame| seed_of_frame(seed, frame)));
         let seeds: HashSet<u64> = seeds.collect();
         assert!(seeds.len() == 15_000 && seeds.iter().all(|&seed| seed < 1 << 53));
     }

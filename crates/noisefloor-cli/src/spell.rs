@@ -28,33 +28,127 @@ impl JobPath {
         std::path::absolute(&self.0).map(Self)
     }
 
-    /// The path with {frame} or {frame:04} filled in; without either, as it is.
+    /// The path with the number of a frame filled in; without a place for it, as it is.
     #[must_use]
-    pub fn of_frame(&self, frame: u32) -> Self {
+    pub fn of_frame(&self, frame: i32) -> Self {
         let bytes = self.0.as_os_str().as_encoded_bytes();
-        let Some((before, digits, after)) = placeholder(bytes) else { return self.clone() };
-        let number = format!("{frame:0digits$}");
-        Self(path([before, number.as_bytes(), after].concat()))
+        let Some(Placeholder { before, number, after, .. }) = placeholder(bytes) else { return self.clone() };
+        Self(path([before, number.of(frame).as_bytes(), after].concat()))
     }
 
-    /// What is in front of {frame}, if that is there once, and nothing of the kind after it.
+    /// What is in front of the number of the frame, if there is one place for it.
     pub(crate) fn before_frame(&self) -> Option<PathBuf> {
-        let (before, _, after) = placeholder(self.0.as_os_str().as_encoded_bytes())?;
-        placeholder(after).is_none().then(|| path(before.to_vec()))
+        let Placeholder { before, after, kind, .. } = placeholder(self.0.as_os_str().as_encoded_bytes())?;
+        kind(after).is_none().then(|| path(before.to_vec()))
     }
 }
 
-/// What is in front of the first {frame} or {frame:04}, its digits, and what follows.
-fn placeholder(bytes: &[u8]) -> Option<(&[u8], usize, &[u8])> {
+/// A text with the number of a frame for {frame} or {frame:04}; none if it holds neither.
+pub fn with_frame(text: &str, frame: i32) -> Option<String> {
+    let mut rest = text.as_bytes();
+    let mut filled = Vec::new();
+    while let Some(Placeholder { before, number, after, .. }) = braces(rest) {
+        filled.extend([before, number.of(frame).as_bytes()].concat());
+        rest = after;
+    }
+    if rest.len() == text.len() {
+        return None;
+    }
+    filled.extend(rest);
+    String::from_utf8(filled).ok()
+}
+
+/// How a number is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Number {
+    /// With a sign among so many characters, as C and Python write it.
+    Wide(usize),
+    /// With a sign before so many digits, as Blender and Houdini do.
+    Digits(usize),
+}
+
+impl Number {
+    fn of(self, frame: i32) -> String {
+        match self {
+            Self::Wide(width) => format!("{frame:0width$}"),
+            Self::Digits(digits) => {
+                let sign = if frame < 0 { "-" } else { "" };
+                format!("{sign}{:0digits$}", frame.unsigned_abs())
+            }
+        }
+    }
+}
+
+/// Where the number of the frame stands.
+struct Placeholder<'a> {
+    before: &'a [u8],
+    number: Number,
+    after: &'a [u8],
+    kind: fn(&[u8]) -> Option<Placeholder<'_>>,
+}
+
+/// The first place for the number of a frame, by the surest kind that is there.
+fn placeholder(bytes: &[u8]) -> Option<Placeholder<'_>> {
+    [braces, percent, dollar, hashes].into_iter().find_map(|kind| kind(bytes))
+}
+
+/// `{frame}` or `{frame:04}`, as in Python.
+fn braces(bytes: &[u8]) -> Option<Placeholder<'_>> {
     const OPEN: &[u8] = b"{frame";
     let begin = bytes.windows(OPEN.len()).position(|window| window == OPEN)?;
     let rest = &bytes[begin + OPEN.len()..];
     let end = rest.iter().position(|byte| *byte == b'}')?;
-    let digits = match std::str::from_utf8(&rest[..end]).ok()? {
+    let width = match std::str::from_utf8(&rest[..end]).ok()? {
         "" => 1,
-        format => format.strip_prefix(":0")?.parse().ok().filter(|digits| (1..=9).contains(digits))?,
+        format => format.strip_prefix(":0")?.parse().ok().filter(|width| (1..=9).contains(width))?,
     };
-    Some((&bytes[..begin], digits, &rest[end + 1..]))
+    Some(Placeholder {
+        before: &bytes[..begin],
+        number: Number::Wide(width),
+        after: &rest[end + 1..],
+        kind: braces,
+    })
+}
+
+/// `%d` or `%04d`, as in C.
+fn percent(bytes: &[u8]) -> Option<Placeholder<'_>> {
+    let found = |(begin, rest): (usize, &[u8])| match rest {
+        [b'%', b'd', ..] => Some((begin, 1, 2)),
+        [b'%', b'0', width @ b'1'..=b'9', b'd', ..] => Some((begin, usize::from(width - b'0'), 4)),
+        _ => None,
+    };
+    let (begin, width, length) = suffixes(bytes).find_map(found)?;
+    let (before, after) = (&bytes[..begin], &bytes[begin + length..]);
+    Some(Placeholder { before, number: Number::Wide(width), after, kind: percent })
+}
+
+/// `$F` or `$F4`, as in Houdini.
+fn dollar(bytes: &[u8]) -> Option<Placeholder<'_>> {
+    let found = |(begin, rest): (usize, &[u8])| {
+        let (digits, length) = match rest.strip_prefix(b"$F")? {
+            [digits @ b'1'..=b'9', ..] => (usize::from(digits - b'0'), 3),
+            _ => (1, 2),
+        };
+        // Another variable, such as $FF
+        let ends = rest.get(length).is_none_or(|next| !next.is_ascii_alphanumeric());
+        ends.then_some((begin, digits, length))
+    };
+    let (begin, digits, length) = suffixes(bytes).find_map(found)?;
+    let (before, after) = (&bytes[..begin], &bytes[begin + length..]);
+    Some(Placeholder { before, number: Number::Digits(digits), after, kind: dollar })
+}
+
+/// `####`, a digit each, as in Blender and Nuke.
+fn hashes(bytes: &[u8]) -> Option<Placeholder<'_>> {
+    let begin = bytes.iter().position(|byte| *byte == b'#')?;
+    let digits = bytes[begin..].iter().take_while(|byte| **byte == b'#').count();
+    let (before, after) = (&bytes[..begin], &bytes[begin + digits..]);
+    Some(Placeholder { before, number: Number::Digits(digits.min(9)), after, kind: hashes })
+}
+
+/// What is left of bytes from each of them on.
+fn suffixes(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    (0..bytes.len()).map(|begin| (begin, &bytes[begin..]))
 }
 
 #[cfg(unix)]
@@ -127,15 +221,43 @@ mod tests {
         for (pattern, frame, before) in [
             ("shots/hall.{frame:04}.xml", "shots/hall.0007.xml", "shots/hall."),
             ("shots/{frame}/hall.xml", "shots/7/hall.xml", "shots/"),
+            ("shots/hall.####.xml", "shots/hall.0007.xml", "shots/hall."),
+            ("shots/hall.#.xml", "shots/hall.7.xml", "shots/hall."),
+            ("shots/hall.%04d.xml", "shots/hall.0007.xml", "shots/hall."),
+            ("shots/hall.%d.xml", "shots/hall.7.xml", "shots/hall."),
+            ("shots/hall.$F4.xml", "shots/hall.0007.xml", "shots/hall."),
+            ("shots/hall.$F.xml", "shots/hall.7.xml", "shots/hall."),
+            // The surest kind counts
+            ("c#/hall.{frame}.xml", "c#/hall.7.xml", "c#/hall."),
         ] {
             let pattern = JobPath::from(pattern);
             assert_eq!((pattern.of_frame(7), pattern.before_frame()), (frame.into(), Some(before.into())));
         }
-        for wrong in
-            ["hall.xml", "{frame", "{frame:4}", "{frame:0x}", "{frame:00}", "{frame}{frame}", "{frame:0999}"]
-        {
+        for wrong in [
+            "hall.xml",
+            "{frame",
+            "{frame:4}",
+            "{frame:0x}",
+            "{frame:00}",
+            "{frame}{frame}",
+            "{frame:0999}",
+            "##.##",
+            "%4d",
+            "%20x",
+            "$Foo",
+            "$F12",
+            "$",
+        ] {
             assert_eq!(JobPath::from(wrong).before_frame(), None, "{wrong}");
         }
+        // Frames before 0, as each of these programs writes them
+        for (pattern, frame) in
+            [("{frame}", "-7"), ("{frame:04}", "-007"), ("%04d", "-007"), ("####", "-0007"), ("$F4", "-0007")]
+        {
+            assert_eq!(JobPath::from(pattern).of_frame(-7), frame.into());
+        }
+        assert_eq!(with_frame("t={frame:02}, {frame}", 7).as_deref(), Some("t=07, 7"));
+        assert_eq!(with_frame("#ff0000 50%d", 7), None);
     }
 
     #[cfg(unix)]

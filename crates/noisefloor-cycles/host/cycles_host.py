@@ -53,6 +53,9 @@ class Cycles:
         else:
             bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
         self.scene = bpy.context.scene
+        if init.get("frame") is not None:
+            # Also switches to the camera that a marker binds to the frame
+            self.scene.frame_set(init["frame"])
         if self.scene.camera is None:
             raise ValueError(f"{path} has no camera")
         warnings = self._configure(init)

@@ -8,7 +8,7 @@
 //!
 //! # What is rendered
 //! The scene as its `.blend` file describes it, with the camera, frame and view layers that were active when
-//! it was saved; with a box filter of one pixel; without clamping of samples, light threshold, adaptive
+//! it was saved, or at the frame of the [`Job`]; with a box filter of one pixel; without clamping of samples, light threshold, adaptive
 //! sampling, denoising, path guiding, compositing and sequencer; and with size and depth from the [`Job`] if
 //! given. Scripts in the file are not run. Radiance is linear; exposure is applied, the view transform is
 //! not.

@@ -15,7 +15,7 @@ pub(crate) const VERSION: u32 = 4;
 /// Longest header of a shard that is read: some 300,000 batches.
 pub(crate) const MAX_HEADER: u64 = 64 << 20;
 /// Version of the format of plans; the first one held words of a command line.
-pub(crate) const PLAN_VERSION: u64 = 4;
+pub(crate) const PLAN_VERSION: u64 = 5;
 
 /// Why a shard cannot be used.
 #[derive(Debug, Error)]

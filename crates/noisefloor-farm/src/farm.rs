@@ -8,7 +8,7 @@ use crate::local::run_local;
 use crate::plan::{Task, split};
 use crate::shard::Shard;
 use crate::slurm::Slurm;
-use crate::state::{FarmPlan, FrameJob, FrameRange, FrameState, Round, RoundState};
+use crate::state::{FarmPlan, FrameJob, FrameState, Frames, Round, RoundState};
 use crate::studio::{News, Studio};
 use crate::task::sample;
 use noisefloor::ProgressiveSource;
@@ -145,8 +145,8 @@ impl<'a, S: Studio> Farm<'a, S> {
 
     /// The render of a frame, as far as it is known without other frames.
     fn planned_job(&self, index: usize) -> S::Job {
-        match self.plan.frames {
-            Some(frames) => self.studio.of_frame(&self.plan.job, frames.first().saturating_add(index as u32)),
+        match self.plan.frames.as_ref().and_then(|frames| frames.get(index)) {
+            Some(frame) => self.studio.of_frame(&self.plan.job, frame),
             None => self.plan.job.clone(),
         }
     }
@@ -154,16 +154,17 @@ impl<'a, S: Studio> Farm<'a, S> {
     /// The render of a frame; those that it waits for are done.
     fn job(&self, index: usize) -> Result<S::Job, FarmError> {
         let job = self.planned_job(index);
-        let Some(frames) = self.plan.frames.filter(|_| self.plan.waits(index)) else { return Ok(job) };
-        let with_folder = |&frame: &u32| (frame, self.folder.frame(&FrameRange::folder(frame)));
+        let frame = self.plan.frames.as_ref().and_then(|frames| frames.get(index));
+        let Some(frame) = frame.filter(|_| self.plan.waits(index)) else { return Ok(job) };
+        let with_folder = |&frame: &i32| (frame, self.folder.frame(&Frames::folder(frame)));
         let first: Vec<_> = self.plan.first.iter().map(with_folder).collect();
-        Ok(self.studio.after(&job, frames.first().saturating_add(index as u32), &first)?)
+        Ok(self.studio.after(&job, frame, &first)?)
     }
 
     /// Whether the frames that others wait for are done.
     fn are_first_done(&self) -> Result<bool, FarmError> {
         for &frame in &self.plan.first {
-            if !self.folder.state(&FrameRange::folder(frame))?.done {
+            if !self.folder.state(&Frames::folder(frame))?.done {
                 return Ok(false);
             }
         }
@@ -190,7 +191,7 @@ impl<'a, S: Studio> Farm<'a, S> {
 
     /// Frames by their indices: those that others wait for come first.
     fn in_order(&self) -> impl Iterator<Item = usize> {
-        let frames = self.plan.frames.map_or(1, FrameRange::count);
+        let frames = self.plan.frames.as_ref().map_or(1, Frames::count);
         let waiting = |waits| (0..frames).filter(move |&index| self.plan.waits(index) == waits);
         waiting(false).chain(waiting(true))
     }

@@ -1,6 +1,6 @@
 //! What a whole sequence takes, from some of its frames.
 
-use crate::state::FrameRange;
+use crate::state::Frames;
 
 /// Student's t, between whose negative and itself nine of ten lie, for 1, 2, 3 … degrees of freedom.
 const T: [f64; 10] = [6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.833, 1.812];
@@ -8,11 +8,11 @@ const T: [f64; 10] = [6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.
 /// A sum over all frames of a sequence, such as samples or seconds, of which some frames are known.
 ///
 /// ```
-/// use noisefloor_farm::{Forecast, FrameRange};
-/// let frames: FrameRange = "1-241".parse()?;
+/// use noisefloor_farm::{Forecast, Frames};
+/// let frames: Frames = "1-241".parse()?;
 /// assert_eq!(frames.spread(5), [1, 61, 121, 181, 241]);
 /// let seconds = [(1, 10.0), (61, 12.0), (121, 13.0), (181, 12.0), (241, 11.0)];
-/// let whole = Forecast::of(frames, &seconds).ok_or("two frames, at least")?;
+/// let whole = Forecast::of(&frames, &seconds).ok_or("two frames, at least")?;
 /// assert!((2800.0..2900.0).contains(&whole.total));
 /// assert!(whole.low < whole.total && whole.total < whole.high);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -36,7 +36,7 @@ impl Forecast {
     /// half the mean square of successive differences is the variance), as if any two frames differed as much
     /// as these. Where the camera moves steadily, frames near each other are more alike, and the range is
     /// wider than it need be. What happens only between the known frames, nobody has seen.
-    pub fn of(frames: FrameRange, known: &[(u32, f64)]) -> Option<Self> {
+    pub fn of(frames: &Frames, known: &[(i32, f64)]) -> Option<Self> {
         let mut known: Vec<_> = known.iter().filter(|(frame, _)| frames.contains(*frame)).copied().collect();
         known.sort_by_key(|(frame, _)| *frame);
         known.dedup_by_key(|(frame, _)| *frame);
@@ -51,14 +51,20 @@ impl Forecast {
 
         // How often each known frame stands for an unknown one: lines between neighbours, summed over the
         // frames
-        let (first, last) = (known[0].0, known[known.len() - 1].0);
         let mut weights = vec![0.0; known.len()];
-        weights[0] = f64::from(first - frames.first());
-        weights[known.len() - 1] += f64::from(frames.last() - last);
-        for (i, pair) in known.windows(2).enumerate() {
-            let between = f64::from(pair[1].0 - pair[0].0 - 1);
-            weights[i] += between / 2.0;
-            weights[i + 1] += between / 2.0;
+        for frame in frames.iter() {
+            let next = known.partition_point(|(known, _)| *known < frame);
+            match (next.checked_sub(1), known.get(next)) {
+                (_, Some((there, _))) if *there == frame => {}
+                (Some(before), Some((after, _))) => {
+                    let (from, to) = (f64::from(known[before].0), f64::from(*after));
+                    let way = (f64::from(frame) - from) / (to - from);
+                    weights[before] += 1.0 - way;
+                    weights[next] += way;
+                }
+                (Some(last), None) => weights[last] += 1.0,
+                (None, _) => weights[0] += 1.0,
+            }
         }
         let expected: f64 = weights.iter().zip(&known).map(|(weight, (_, value))| weight * value).sum();
 
@@ -81,7 +87,7 @@ mod tests {
     use super::*;
     use noisefloor_testkit::Noise;
 
-    fn frames(range: &str) -> FrameRange {
+    fn frames(range: &str) -> Frames {
         range.parse().unwrap()
     }
 
@@ -89,7 +95,7 @@ mod tests {
     fn lines_between_known_frames_are_summed() {
         // 10, 12, 14, 16, 18, and 18 twice more; the first frame as the second
         let known = [(6, 18.0), (2, 10.0)];
-        let found = Forecast::of(frames("1-8"), &known).unwrap();
+        let found = Forecast::of(&frames("1-8"), &known).unwrap();
         assert!((found.total - (10.0 + 70.0 + 36.0)).abs() < 1e-9, "{found:?}");
         // Weights 1 + 3/2 and 2 + 3/2, six unknown frames, 8²/2, and t of one degree of freedom
         let share = (32.0 * (2.5f64.powi(2) + 3.5f64.powi(2) + 6.0)).sqrt() / 88.0;
@@ -99,11 +105,11 @@ mod tests {
 
     #[test]
     fn what_is_known_has_no_range_and_one_frame_says_nothing() {
-        let all = Forecast::of(frames("3-4"), &[(3, 1.0), (4, 2.0), (9, 5.0)]).unwrap();
+        let all = Forecast::of(&frames("3-4"), &[(3, 1.0), (4, 2.0), (9, 5.0)]).unwrap();
         assert_eq!(all, Forecast { total: 3.0, low: 3.0, high: 3.0 });
-        assert_eq!(Forecast::of(frames("3-4"), &[(3, 1.0), (3, 1.0)]), None);
-        assert_eq!(Forecast::of(frames("7-7"), &[(7, 1.0)]).map(|one| one.total), Some(1.0));
-        assert_eq!(Forecast::of(frames("1-9"), &[(1, 0.0), (9, 0.0)]).map(|one| one.high), Some(0.0));
+        assert_eq!(Forecast::of(&frames("3-4"), &[(3, 1.0), (3, 1.0)]), None);
+        assert_eq!(Forecast::of(&frames("7-7"), &[(7, 1.0)]).map(|one| one.total), Some(1.0));
+        assert_eq!(Forecast::of(&frames("1-9"), &[(1, 0.0), (9, 0.0)]).map(|one| one.high), Some(0.0));
     }
 
     /// Of 2,000 sequences whose frames differ by chance alone, nine of ten are within the range. A program of
@@ -118,7 +124,7 @@ mod tests {
                 let truth: Vec<f64> = all.iter().map(|_| 100.0 + 10.0 * noise.normal()).collect();
                 let seen: Vec<_> =
                     all.spread(known).into_iter().map(|frame| (frame, truth[frame as usize - 1])).collect();
-                let found = Forecast::of(all, &seen).unwrap();
+                let found = Forecast::of(&all, &seen).unwrap();
                 let total: f64 = truth.iter().sum();
                 within += usize::from((found.low..=found.high).contains(&total));
             }

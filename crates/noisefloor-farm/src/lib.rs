@@ -66,6 +66,6 @@ pub use merge::{Merged, Problem, ShardSet};
 pub use plan::{Task, split};
 pub use shard::{BatchEntry, Shard, ShardFile, ShardJob};
 pub use slurm::Slurm;
-pub use state::{FarmPlan, FrameJob, FrameRange, FrameState, Round, RoundState, SlurmJobs};
+pub use state::{FarmPlan, FrameJob, FrameState, Frames, Round, RoundState, SlurmJobs};
 pub use studio::{Finished, FrameSource, News, RenderFiles, Studio};
 pub use task::sample;

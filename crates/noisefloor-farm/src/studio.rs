@@ -21,14 +21,14 @@ pub trait Studio {
     const CHECKPOINT: &'static str;
 
     /// The job of a frame of a sequence.
-    fn of_frame(&self, job: &Self::Job, frame: u32) -> Self::Job;
+    fn of_frame(&self, job: &Self::Job, frame: i32) -> Self::Job;
 
     /// The job of a frame that has waited for others, which are done: their numbers and folders. By default,
     /// they have changed nothing.
     ///
     /// # Errors
     /// Its own.
-    fn after(&self, job: &Self::Job, frame: u32, first: &[(u32, PathBuf)]) -> Result<Self::Job, StudioError> {
+    fn after(&self, job: &Self::Job, frame: i32, first: &[(i32, PathBuf)]) -> Result<Self::Job, StudioError> {
         let _ = (frame, first);
         Ok(job.clone())
     }

@@ -13,6 +13,7 @@ use exr::block::reader::ChunksReader;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use exr::prelude::f16;
+use noisefloor::internal::printable;
 use noisefloor::{Rgb, viewing::Chromaticities};
 use std::collections::HashSet;
 use std::path::Path;
@@ -30,10 +31,11 @@ const NAMES_SHOWN: usize = 20;
 /// Reads the colours of an EXR: 16- or 32-bit floats, or unsigned integers, in any compression the `exr`
 /// crate supports.
 ///
-/// Of several parts and layers, the first with R, G and B is read: in each part the unnamed one, then one
-/// named `Combined` (as in `ViewLayer.Combined.R`), then the first in alphabetical order. If there is none, a
-/// lone unnamed Y is read as grey. Other channels are ignored, alpha among them; colour is as stored, that
-/// is, premultiplied.
+/// Of several parts and layers with R, G and B, the picture is read: the unnamed one, or one that is named as renderers
+/// name it (`ViewLayer.Combined`, `rgba`, `beauty`, `image`, …), or the only one that is not named as a pass of normals,
+/// albedo and the like. If more than one is left, [`PictureError::Layers`] asks which. If no layer has colours, a lone
+/// unnamed Y is read as grey. Other channels are ignored, alpha among them; colour is as stored, that is,
+/// premultiplied.
 ///
 /// The picture is the display window. Where the data window is smaller, pixels are black; where it is larger
 /// (overscan), it is cropped. Of mip maps, the full resolution is read. Non-finite values are kept.
@@ -67,19 +69,14 @@ pub(crate) struct Layout {
 pub(crate) fn layout_of(path: &Path, opened: Opened) -> Result<Layout, PictureError> {
     guarded(path, "EXR", || {
         let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
+        let wanted = opened.layer.as_deref();
         let reader = exr::block::read(opened.reader, false).map_err(|e| broken(e.to_string()))?;
         let parts = reader.headers();
-        let names = channel_names(parts);
-        let full = |part: usize, layer: &str| {
-            let name = parts[part].own_attributes.layer_name.as_ref().map(ToString::to_string);
-            let prefix = name.filter(|_| parts.len() > 1).map(|name| format!("{name}.")).unwrap_or_default();
-            format!("{prefix}{layer}").trim_end_matches('.').to_owned()
-        };
-        let coloured = |(part, names): (usize, &'_ Vec<String>)| -> Vec<String> {
-            coloured_layers(names).into_iter().map(|(layer, _)| full(part, layer)).collect()
-        };
-        let layers = names.iter().enumerate().flat_map(coloured).collect();
-        Ok(Layout { layers, has_alpha: choose_alpha(path, parts).is_ok() })
+        let (layers, read) = (coloured_layers(parts), choose(path, parts, wanted)?);
+        let (first, others): (Vec<_>, Vec<_>) =
+            layers.into_iter().partition(|layer| (layer.part, layer.channels) == (read.part, read.channels));
+        let layers = first.into_iter().chain(others).map(|layer| layer.name).collect();
+        Ok(Layout { layers, has_alpha: choose_alpha(path, parts, wanted).is_ok() })
     })
 }
 
@@ -91,7 +88,7 @@ pub(crate) fn alpha_of(path: &Path, opened: Opened) -> Result<LinearImage, Pictu
 fn decode_unguarded(
     path: &Path,
     opened: Opened,
-    choose: fn(&Path, &[Header]) -> Result<Choice, PictureError>,
+    choose: fn(&Path, &[Header], Option<&str>) -> Result<Choice, PictureError>,
 ) -> Result<LinearImage, PictureError> {
     let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
 
@@ -102,7 +99,7 @@ fn decode_unguarded(
         exr::error::Error::NotSupported(what) if what.contains("subsampl") => subsampled(path),
         e => broken(e.to_string()),
     })?;
-    let choice = choose(path, reader.headers())?;
+    let choice = choose(path, reader.headers(), opened.layer.as_deref())?;
     let part = reader.headers()[choice.part].clone();
     check_part(path, &part, most)?;
     let blocks = reader.headers().iter().try_fold(0usize, |sum, h| sum.checked_add(h.chunk_count));
@@ -180,18 +177,132 @@ fn channel_names(parts: &[Header]) -> Vec<Vec<String>> {
     parts.iter().map(|part| part.channels.list.iter().map(|c| c.name.to_string()).collect()).collect()
 }
 
-/// The layers of a part that have colours, the most likely picture first, with the places of R, G and B.
-fn coloured_layers(names: &[String]) -> Vec<(&str, [usize; 3])> {
-    let colours = |layer: &str| {
-        let at = |channel: &str| names.iter().position(|name| *name == format!("{layer}{channel}"));
-        Some([at("R")?, at("G")?, at("B")?])
+/// A layer with R, G and B, and the places of these in the list of channels of its part.
+struct Layer {
+    part: usize,
+    /// Of the layer, behind that of its part if there are several; empty if neither has one.
+    name: String,
+    channels: [usize; 3],
+}
+
+/// The layers that have colours, in the order of the file.
+fn coloured_layers(parts: &[Header]) -> Vec<Layer> {
+    let mut layers = Vec::new();
+    for (part, names) in channel_names(parts).iter().enumerate() {
+        let called = parts[part].own_attributes.layer_name.as_ref().map(ToString::to_string);
+        let called = called.filter(|_| parts.len() > 1).unwrap_or_default();
+        let prefixes = names.iter().filter_map(|n| n.strip_suffix('R'));
+        for prefix in prefixes.filter(|prefix| prefix.is_empty() || prefix.ends_with('.')) {
+            let at = |channel: &str| names.iter().position(|name| *name == format!("{prefix}{channel}"));
+            let Some(channels) = [at("R"), at("G"), at("B")].into_iter().collect::<Option<Vec<_>>>() else {
+                continue;
+            };
+            let layer = prefix.trim_end_matches('.');
+            // Blender repeats the name of the part in those of its channels
+            let name = match (called.as_str(), layer) {
+                ("", name) | (name, "") => name.to_owned(),
+                (part, layer) if layer.starts_with(part) => layer.to_owned(),
+                (part, layer) => format!("{part}.{layer}"),
+            };
+            layers.push(Layer { part, name, channels: [channels[0], channels[1], channels[2]] });
+        }
+    }
+    layers
+}
+
+/// How renderers name the layer of the picture (Arnold, V-Ray, RenderMan, Mitsuba, Nuke), the surest first.
+const PICTURES: [&str; 14] = [
+    "combined",
+    "rgba",
+    "rgb",
+    "beauty",
+    "image",
+    "color",
+    "colour",
+    "ci",
+    "c",
+    "final",
+    "main",
+    "default",
+    "render",
+    "composite",
+];
+/// How Blender names what the layer `Combined` is of: its compositor's picture, and the first view layer.
+const SHOWN: [&str; 4] = ["composite", "viewlayer", "view layer", "renderlayer"];
+/// How names of layers begin that are no picture, in lower case.
+const PASSES: [&str; 26] = [
+    "albedo", "ao", "crypto", "debug", "denois", "depth", "diffcol", "id", "index", "mask", "matte", "mist",
+    "motion", "noisy", "normal", "object", "material", "p", "pos", "shadow", "st", "tangent", "uv",
+    "variance", "vector", "z",
+];
+
+/// How likely a layer is the picture: the lower, the likelier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Likelihood {
+    Unnamed,
+    /// Named as renderers do: the place in [`PICTURES`], and in [`SHOWN`].
+    Picture(usize, usize),
+    Unknown,
+    Pass,
+}
+
+impl Likelihood {
+    fn of(name: &str) -> Self {
+        let name = name.to_lowercase();
+        let mut words = name.split('.').filter(|word| !matches!(*word, "left" | "right")).rev();
+        let Some(last) = words.next().filter(|word| !word.is_empty()) else { return Self::Unnamed };
+        if let Some(rank) = PICTURES.iter().position(|known| *known == last) {
+            let first = words.next_back().unwrap_or_default();
+            let shown = SHOWN.iter().position(|known| *known == first);
+            return Self::Picture(rank, shown.unwrap_or(SHOWN.len()));
+        }
+        // N, P, AO and their like are short: longer words may begin so without being one
+        let is = |pass: &str| if pass.len() <= 2 { last == pass } else { last.starts_with(pass) };
+        let is_pass = last == "n" || name.contains("crypto") || PASSES.iter().any(|pass| is(pass));
+        if is_pass { Self::Pass } else { Self::Unknown }
+    }
+}
+
+/// The picture among layers: the one that is asked for, or the likeliest if it is the only one.
+fn the_picture<'l>(
+    path: &Path,
+    layers: &'l [Layer],
+    wanted: Option<&str>,
+) -> Result<Option<&'l Layer>, PictureError> {
+    let found = || match layers {
+        [] => "none".to_owned(),
+        _ => listed(layers.iter().map(|l| if l.name.is_empty() { "(unnamed)" } else { &l.name })),
     };
-    layers(names).into_iter().filter_map(|layer| Some((layer, colours(layer)?))).collect()
+    if let Some(wanted) = wanted {
+        let wanted = wanted.trim_end_matches('.').to_lowercase();
+        let exact: Vec<_> = layers.iter().filter(|layer| layer.name.to_lowercase() == wanted).collect();
+        let behind = |layer: &&Layer| layer.name.to_lowercase().ends_with(&format!(".{wanted}"));
+        let ends: Vec<_> = layers.iter().filter(behind).collect();
+        return match (exact.as_slice(), ends.as_slice()) {
+            ([layer, ..], _) | ([], [layer]) => Ok(Some(layer)),
+            _ => Err(PictureError::NoLayer { path: path.to_owned(), layer: wanted, found: found() }),
+        };
+    }
+    let likelihood = |layer: &Layer| Likelihood::of(&layer.name);
+    let Some(best) = layers.iter().map(likelihood).min() else { return Ok(None) };
+    let best: Vec<_> = layers.iter().filter(|layer| likelihood(layer) == best).collect();
+    match best.as_slice() {
+        [layer] => Ok(Some(layer)),
+        // Parts that have no names come in their order
+        [first, ..] if first.name.is_empty() => Ok(Some(first)),
+        _ => Err(PictureError::Layers { path: path.to_owned(), found: found() }),
+    }
+}
+
+/// Names, of which many are cut.
+fn listed<'n>(names: impl Iterator<Item = &'n str>) -> String {
+    let names: Vec<String> = names.map(|name| printable(name).into_owned()).collect();
+    names[..names.len().min(NAMES_SHOWN)].join(", ") + if names.len() > NAMES_SHOWN { ", …" } else { "" }
 }
 
 /// Alpha beside the colours that are read.
-fn choose_alpha(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
-    let Choice { part, channels } = choose(path, parts)?;
+fn choose_alpha(path: &Path, parts: &[Header], wanted: Option<&str>) -> Result<Choice, PictureError> {
+    let Choice { part, channels } = choose(path, parts, wanted)?;
     let names = &channel_names(parts)[part];
     let red = &names[channels[0]];
     let alpha = format!("{}A", red.strip_suffix(['R', 'Y']).unwrap_or_default());
@@ -203,48 +314,26 @@ fn choose_alpha(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
     }
 }
 
-fn choose(path: &Path, parts: &[Header]) -> Result<Choice, PictureError> {
-    let names = channel_names(parts);
-
+fn choose(path: &Path, parts: &[Header], wanted: Option<&str>) -> Result<Choice, PictureError> {
     // Colour, then grey
-    let colour = names.iter().enumerate().find_map(|(part, names)| {
-        let (_, channels) = coloured_layers(names).into_iter().next()?;
-        Some(Choice { part, channels })
+    if let Some(Layer { part, channels, .. }) = the_picture(path, &coloured_layers(parts), wanted)? {
+        return Ok(Choice { part: *part, channels: *channels });
+    }
+    let names = channel_names(parts);
+    let grey = names.iter().enumerate().find_map(|(part, names)| {
+        // Beside chroma, or as one of three coordinates, Y is not the picture
+        let alone = !names.iter().any(|name| ["RY", "BY", "X", "Z"].contains(&name.as_str()));
+        let y = names.iter().position(|name| name == "Y").filter(|_| alone)?;
+        Some(Choice { part, channels: [y; 3] })
     });
-    let grey = || {
-        names.iter().enumerate().find_map(|(part, names)| {
-            // Beside chroma, or as one of three coordinates, Y is not the picture
-            let alone = !names.iter().any(|name| ["RY", "BY", "X", "Z"].contains(&name.as_str()));
-            let y = names.iter().position(|name| name == "Y").filter(|_| alone)?;
-            Some(Choice { part, channels: [y; 3] })
-        })
-    };
-
-    colour.or_else(grey).ok_or_else(|| {
+    grey.ok_or_else(|| {
         let all: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
         let missing: Vec<&str> = ["R", "G", "B"].into_iter().filter(|name| !all.contains(name)).collect();
         let missing =
             if missing.is_empty() { "R, G and B in one part".to_owned() } else { missing.join(", ") };
-        let found = match all.len() {
-            0 => "none".to_owned(),
-            n => all[..n.min(NAMES_SHOWN)].join(", ") + if n > NAMES_SHOWN { ", …" } else { "" },
-        };
+        let found = if all.is_empty() { "none".to_owned() } else { listed(all.into_iter()) };
         PictureError::Channels { path: path.to_owned(), missing, found }
     })
-}
-
-/// Prefixes of layers with a red channel, the most likely picture first; the unnamed layer has the empty
-/// prefix.
-fn layers(names: &[String]) -> Vec<&str> {
-    let mut layers: Vec<&str> = names
-        .iter()
-        .filter_map(|n| n.strip_suffix('R'))
-        .filter(|l| l.is_empty() || l.ends_with('.'))
-        .collect();
-    layers.sort_by_key(|layer| {
-        (!layer.is_empty(), !(*layer == "Combined." || layer.ends_with(".Combined.")), *layer)
-    });
-    layers
 }
 
 /// Pictures of luminance and chroma have a quarter of their chroma.

@@ -10,13 +10,16 @@ use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
 use noisefloor::internal::printable;
 use noisefloor::viewing::{Chromaticities, Viewing};
 use png::{CodingIndependentCodePoints, SourceChromaticities};
-use std::io::Seek;
+use std::io::{self, Read, Seek};
 use std::path::Path;
 
 /// Memory for everything in a PNG that is not pixels: rows, profiles, text.
 const MAX_PNG_EXTRA: u64 = 256 << 20;
 /// Most pixels that a byte of a PNG can stand for: deflate reaches 1032:1, and a pixel has at least one bit.
 const PIXELS_A_BYTE: u64 = 1032 * 8;
+
+/// Most chunks before the pixels in which colours are looked for.
+const MAX_CHUNKS: usize = 10_000;
 
 /// Reads a PNG as display values: sRGB-encoded RGB in 0…1, 8- or 16-bit codes divided by 255 or 65535.
 ///
@@ -96,10 +99,27 @@ fn stated(path: &Path, opened: &mut Opened) -> Result<Option<Stated>, PictureErr
         stated,
         advice: "save it with the colours of sRGB",
     };
+    let io = |source| PictureError::Io { path: path.to_owned(), source };
+    let chunks = chunks_before_pixels(&mut opened.reader).map_err(io)?;
+    opened.reader.rewind().map_err(io)?;
     let limits = png::Limits { bytes: MAX_PNG_EXTRA as usize };
     let reader = png::Decoder::new_with_limits(&mut opened.reader, limits).read_info();
     let reader = reader.map_err(|e| broken(e.to_string()))?;
     let info = reader.info();
+    // The decoder passes over chunks that it cannot read; the colours of the file would be taken for sRGB
+    let known = [
+        (*b"cICP", info.coding_independent_code_points.is_some()),
+        (*b"iCCP", info.icc_profile.is_some()),
+        (*b"sRGB", info.srgb.is_some()),
+        (*b"gAMA", info.gama_chunk.is_some()),
+        (*b"cHRM", info.chrm_chunk.is_some()),
+    ];
+    let known = known.map(|(kind, read)| (kind, read, chunks.contains(&kind)));
+    // What comes after one that is believed is not looked at; the last two are believed together
+    let believed = known.iter().take(3).position(|(_, read, _)| *read).unwrap_or(known.len());
+    if let Some((kind, ..)) = known.iter().take(believed).find(|(_, read, there)| *there && !read) {
+        return Err(refused(format!("those of a chunk {}, which cannot be read", kind.escape_ascii())));
+    }
     let found = if let Some(points) = info.coding_independent_code_points {
         Some(by_points(points).ok_or_else(|| refused(code_points(points)))?)
     } else if let Some(profile) = &info.icc_profile {
@@ -112,8 +132,30 @@ fn stated(path: &Path, opened: &mut Opened) -> Result<Option<Stated>, PictureErr
         by_gamma(gamma, gamut).map_err(refused)?
     };
     drop(reader);
-    opened.reader.rewind().map_err(|source| PictureError::Io { path: path.to_owned(), source })?;
+    opened.reader.rewind().map_err(io)?;
     Ok(found.filter(|found| !is_srgb(found)))
+}
+
+/// The kinds of the chunks before the pixels, as far as there are chunks.
+fn chunks_before_pixels(reader: &mut (impl Read + Seek)) -> io::Result<Vec<[u8; 4]>> {
+    const SIGNATURE: i64 = 8;
+    const CRC: i64 = 4;
+    let mut kinds = Vec::new();
+    reader.seek_relative(SIGNATURE)?;
+    let mut header = [0; 8];
+    while kinds.len() < MAX_CHUNKS {
+        match reader.read_exact(&mut header) {
+            Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => break,
+            read => read?,
+        }
+        let [a, b, c, d, kind @ ..] = header;
+        if kind == *b"IDAT" {
+            break;
+        }
+        kinds.push(kind);
+        reader.seek_relative(i64::from(u32::from_be_bytes([a, b, c, d])) + CRC)?;
+    }
+    Ok(kinds)
 }
 
 /// ITU-T H.273, tables 2 and 3. The curves of cameras are left out: programs disagree on how to show them.

@@ -27,6 +27,14 @@ pub enum PictureError {
         /// What it should be.
         wanted: &'static str,
     },
+    /// A file that stands for the picture: a pointer of Git LFS or git-annex, or a web page.
+    #[error("{}: {instead}", path.display())]
+    StandIn {
+        /// The file.
+        path: PathBuf,
+        /// What it is, and what to do.
+        instead: &'static str,
+    },
     /// The file is longer than [`MAX_FILE_BYTES`](crate::MAX_FILE_BYTES).
     #[error(
         "{}: {bytes} bytes exceed the limit of {limit}; save fewer layers or a smaller image",
@@ -97,6 +105,24 @@ pub enum PictureError {
         /// Names of the missing channels, comma-separated.
         missing: String,
         /// Names of the existing channels, comma-separated, at most twenty.
+        found: String,
+    },
+    /// It has several layers, none of which is known to be the picture, and nobody said which is meant.
+    #[error("{}: has the layers {found}, and does not say which is the picture; name one by --layer", path.display())]
+    Layers {
+        /// The file.
+        path: PathBuf,
+        /// Names of the layers that have colours, comma-separated, at most twenty.
+        found: String,
+    },
+    /// It has no colours in the layer that was asked for, or in more than one that is called so.
+    #[error("{}: the layer {layer:?} is not one of those with R, G and B: {found}", path.display())]
+    NoLayer {
+        /// The file.
+        path: PathBuf,
+        /// The layer.
+        layer: String,
+        /// As above.
         found: String,
     },
     /// It does not say how many samples it has, and nobody else did.

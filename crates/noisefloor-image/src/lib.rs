@@ -63,10 +63,10 @@ pub use decode_png::read_png;
 pub use error::{PictureError, StackError, WriteError};
 pub use facts::{SampleFacts, read_facts};
 pub use frames::{Frame, batches, running_means};
-pub use open::MAX_FILE_BYTES;
+pub use open::{MAX_FILE_BYTES, ReadOptions};
 pub use picture::{DisplayImage, LinearImage, Picture};
 pub use plane::Plane;
-pub use read::{read_picture, read_picture_on, read_picture_within, read_still, read_still_on};
+pub use read::{read_picture, read_picture_with, read_still, read_still_with};
 pub use stack::StackSource;
 #[cfg(feature = "tables")]
 pub use table::write_csv;

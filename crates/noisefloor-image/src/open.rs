@@ -1,7 +1,8 @@
 //! Opening files that may be hostile: what the decoders share.
 
 use crate::error::PictureError;
-use noisefloor::internal::check_image;
+use noisefloor::internal::{check_image, stand_in};
+use noisefloor::viewing::Viewing;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,6 +12,25 @@ use std::path::Path;
 /// floats.
 pub const MAX_FILE_BYTES: u64 = 1 << 32;
 
+/// How a picture is read.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// The display that it is to be shown on. It takes the codes of a PNG that states no colours, states sRGB, or
+    /// states what the display takes, such as PQ; all others are converted to sRGB if it takes that.
+    pub viewing: Viewing,
+    /// Most pixels: a larger picture is refused before any pixel is allocated.
+    pub most_pixels: usize,
+    /// The layer of an EXR: its name, as in `ViewLayer.Combined`, or the end of it, as in `Combined`; capitals do not
+    /// matter. Without it, see [`read_exr`](crate::read_exr).
+    pub layer: Option<String>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self { viewing: Viewing::default(), most_pixels: noisefloor::tile::MAX_PIXELS, layer: None }
+    }
+}
+
 /// The format that the first bytes announce.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Format {
@@ -18,7 +38,8 @@ pub(crate) enum Format {
     Pfm,
     Png,
     Empty,
-    Other,
+    /// Something else, and what if that is known.
+    Other(Option<&'static str>),
 }
 
 /// A regular file of acceptable length and known format, positioned at its first byte.
@@ -28,6 +49,8 @@ pub(crate) struct Opened {
     pub(crate) format: Format,
     /// Most pixels that are decoded.
     pub(crate) most_pixels: usize,
+    /// The layer of an EXR that is asked for.
+    pub(crate) layer: Option<String>,
 }
 
 impl Opened {
@@ -46,26 +69,41 @@ impl Opened {
         }
 
         let mut reader = BufReader::new(File::open(path).map_err(io)?);
-        let mut magic = Vec::with_capacity(8);
-        reader.by_ref().take(8).read_to_end(&mut magic).map_err(io)?;
+        let mut start = Vec::with_capacity(64);
+        reader.by_ref().take(64).read_to_end(&mut start).map_err(io)?;
         reader.rewind().map_err(io)?;
-        let format = match magic.as_slice() {
+        let format = match start.as_slice() {
             [] => Format::Empty,
             [0x76, 0x2f, 0x31, 0x01, ..] => Format::Exr,
             [b'P', b'F' | b'f', b'\n' | b'\r', ..] => Format::Pfm,
-            [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'] => Format::Png,
-            _ => Format::Other,
+            [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Format::Png,
+            _ => Format::Other(stand_in(&start)),
         };
-        Ok(Self { reader, bytes, format, most_pixels: noisefloor::tile::MAX_PIXELS })
+        Ok(Self { reader, bytes, format, most_pixels: noisefloor::tile::MAX_PIXELS, layer: None })
+    }
+
+    /// The layer that is asked for, which only an EXR has.
+    pub(crate) fn with_layer(self, path: &Path, options: &ReadOptions) -> Result<Self, PictureError> {
+        match (&options.layer, self.format) {
+            (Some(layer), Format::Pfm | Format::Png) => Err(PictureError::NoLayer {
+                path: path.to_owned(),
+                layer: layer.clone(),
+                found: "none, as only EXR files have layers".to_owned(),
+            }),
+            (layer, _) => Ok(Self { layer: layer.clone(), ..self }),
+        }
     }
 
     pub(crate) fn foreign(&self, path: &Path, wanted: &'static str) -> PictureError {
+        if let Format::Other(Some(instead)) = self.format {
+            return PictureError::StandIn { path: path.to_owned(), instead };
+        }
         let found = match self.format {
             Format::Exr => "an OpenEXR file",
             Format::Pfm => "a PFM file",
             Format::Png => "a PNG file",
             Format::Empty => "an empty file",
-            Format::Other => "something else",
+            Format::Other(_) => "something else",
         };
         PictureError::Foreign { path: path.to_owned(), found, wanted }
     }

@@ -2,10 +2,10 @@
 
 use crate::error::PictureError;
 use crate::facts::read_facts;
-use crate::open::{Format, Opened};
+use crate::open::{Format, Opened, ReadOptions};
 use crate::picture::Picture;
 use crate::{decode_exr, decode_pfm, decode_png};
-use noisefloor::{stills::Still, viewing::Viewing};
+use noisefloor::stills::Still;
 use std::path::Path;
 
 /// Reads an EXR, PFM or PNG file. Its first bytes tell the format; its name does not matter.
@@ -14,37 +14,24 @@ use std::path::Path;
 /// Those of [`read_exr`](crate::read_exr), [`read_pfm`](crate::read_pfm) and [`read_png`](crate::read_png);
 /// [`PictureError::Foreign`] for any other format.
 pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
-    read_picture_within(path, noisefloor::tile::MAX_PIXELS)
+    read_picture_with(path, &ReadOptions::default())
 }
 
-/// [`read_picture_within`], to be shown on a display other than the usual one. It takes the codes of a PNG
-/// that states no colours, states sRGB, or states what the display takes, such as PQ; all others are
-/// converted to sRGB if it takes that.
+/// [`read_picture`], with what it leaves open.
 ///
 /// # Errors
-/// Those of [`read_picture_within`], and [`PictureError::Colours`] if this display does not take the colours
-/// of a PNG.
-pub fn read_picture_on(
-    path: impl AsRef<Path>,
-    viewing: &Viewing,
-    most: usize,
-) -> Result<Picture, PictureError> {
+/// Those of [`read_picture`]; [`PictureError::Large`], [`PictureError::NoLayer`] if there is no such layer or the
+/// format has none, and [`PictureError::Colours`] if the display does not take the colours of a PNG.
+pub fn read_picture_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Picture, PictureError> {
     let path = path.as_ref();
-    let opened = Opened { most_pixels: most, ..Opened::open(path)? };
+    let opened =
+        Opened { most_pixels: options.most_pixels, ..Opened::open(path)? }.with_layer(path, options)?;
     match opened.format {
         Format::Exr => decode_exr::decode(path, opened).map(Picture::Linear),
         Format::Pfm => decode_pfm::decode(path, opened).map(Picture::Linear),
-        Format::Png => decode_png::decode(path, opened, viewing).map(Picture::Display),
+        Format::Png => decode_png::decode(path, opened, &options.viewing).map(Picture::Display),
         _ => Err(opened.foreign(path, "an OpenEXR, PFM or PNG file")),
     }
-}
-
-/// [`read_picture`], limited to `most` pixels: a larger picture is refused before any pixel is allocated.
-///
-/// # Errors
-/// Those of [`read_picture`], and [`PictureError::Large`].
-pub fn read_picture_within(path: impl AsRef<Path>, most: usize) -> Result<Picture, PictureError> {
-    read_picture_on(path, &Viewing::default(), most)
 }
 
 /// [`read_picture`], as one side of a comparison: with `spp` samples per pixel, or with those that the file
@@ -54,21 +41,21 @@ pub fn read_picture_within(path: impl AsRef<Path>, most: usize) -> Result<Pictur
 /// Those of [`read_picture`]; without `spp`, also [`PictureError::NoSamples`] and
 /// [`PictureError::UnevenSamples`].
 pub fn read_still(path: impl AsRef<Path>, spp: Option<f64>) -> Result<Still, PictureError> {
-    read_still_on(path, spp, &Viewing::default())
+    read_still_with(path, spp, &ReadOptions::default())
 }
 
-/// [`read_still`], to be shown on this display: see [`read_picture_on`].
+/// [`read_still`], with what it leaves open.
 ///
 /// # Errors
-/// Those of [`read_still`] and [`read_picture_on`].
-pub fn read_still_on(
+/// Those of [`read_still`] and [`read_picture_with`].
+pub fn read_still_with(
     path: impl AsRef<Path>,
     spp: Option<f64>,
-    viewing: &Viewing,
+    options: &ReadOptions,
 ) -> Result<Still, PictureError> {
     let path = path.as_ref();
     // What is no picture has no samples either
-    let (picture, facts) = (read_picture_on(path, viewing, noisefloor::tile::MAX_PIXELS)?, read_facts(path)?);
+    let (picture, facts) = (read_picture_with(path, options)?, read_facts(path)?);
     let spp = match (spp, facts.samples) {
         (Some(spp), _) => spp,
         (None, Some((fewest, most))) if fewest < most => {

@@ -4,7 +4,7 @@ use crate::colours::Stated;
 use crate::decode_exr::{Layout, alpha_of, layout_of};
 use crate::error::PictureError;
 use crate::open::{Format, Opened};
-use crate::{decode_png, read_picture};
+use crate::{ReadOptions, decode_png, read_picture_with};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -29,9 +29,7 @@ impl Unread {
         if let [read, others @ ..] = self.layers.as_slice() {
             let others: Vec<String> = others.iter().map(name).collect();
             let (read, others) = (name(read), others.join(", "));
-            all.push(format!(
-                "of its layers, {read} is read, and not {others}; save the one you mean by itself"
-            ));
+            all.push(format!("of its layers, {read} is read, and not {others}; another is read by --layer"));
         }
         match &self.alpha {
             Some(alpha) if *alpha.end() <= 0.0 => all.push(
@@ -54,18 +52,19 @@ impl Unread {
     }
 }
 
-/// Finds what [`read_picture`](crate::read_picture) leaves out. Reads the pixels again if there is alpha.
+/// Finds what [`read_picture_with`](crate::read_picture_with) leaves out. Reads the pixels again if there is alpha.
 ///
 /// # Errors
-/// Those of [`read_picture`](crate::read_picture).
-pub fn read_unread(path: impl AsRef<Path>) -> Result<Unread, PictureError> {
+/// Those of [`read_picture_with`](crate::read_picture_with).
+pub fn read_unread(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Unread, PictureError> {
     let path = path.as_ref();
-    let opened = Opened::open(path)?;
+    let open = || Opened::open(path)?.with_layer(path, options);
+    let opened = open()?;
     match opened.format {
         Format::Exr => {
             let Layout { layers, has_alpha } = layout_of(path, opened)?;
             let layers = if layers.len() > 1 { layers } else { Vec::new() };
-            let alpha = if has_alpha { Some(alpha_of(path, Opened::open(path)?)?) } else { None };
+            let alpha = if has_alpha { Some(alpha_of(path, open()?)?) } else { None };
             Ok(Unread {
                 layers,
                 alpha: alpha.map(|image| range(image.pixels.iter().map(|p| p[0]))),
@@ -74,12 +73,12 @@ pub fn read_unread(path: impl AsRef<Path>) -> Result<Unread, PictureError> {
         }
         Format::Png => {
             let alpha = decode_png::decode_alpha(path, opened)?;
-            let colours = decode_png::stated_colours(path, Opened::open(path)?)?;
+            let colours = decode_png::stated_colours(path, open()?)?;
             let hdr = colours.filter(Stated::is_hdr).map(|colours| colours.describe());
             Ok(Unread { layers: Vec::new(), alpha: alpha.map(|alpha| range(alpha.into_iter())), hdr })
         }
         // PFM has colours only, and anything else is refused there
-        _ => read_picture(path).map(|_| Unread::default()),
+        _ => read_picture_with(path, options).map(|_| Unread::default()),
     }
 }
 

@@ -156,9 +156,21 @@ fn from_device<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Option<Bound<'
     Ok(Some(numpy.call_method("from_dlpack", (object,), Some(&options))?))
 }
 
+/// Refuses arrays with masked elements. What is under a mask is anything, and `asarray` would take it for a value.
+pub(crate) fn refuse_masked(object: Borrowed<'_, '_, PyAny>) -> PyResult<()> {
+    match object.py().import("numpy.ma")?.call_method1("is_masked", (object,))?.is_truthy()? {
+        true => {
+            let message = "some elements are masked: replace them first, with array.filled(value)";
+            Err(PictureError::new_err(message))
+        }
+        false => Ok(()),
+    }
+}
+
 /// An array of shape (height, width, 3) of any type.
 fn array<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = object.py();
+    refuse_masked(object)?;
     let array = match from_device(object) {
         Ok(Some(array)) => Ok(array),
         Ok(None) => py.import("numpy")?.call_method1("asarray", (object,)),

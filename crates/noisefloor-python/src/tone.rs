@@ -1,5 +1,6 @@
 //! How a picture is shown by more than a curve: a table of colours, or a file of one.
 
+use crate::arrays::refuse_masked;
 use crate::errors::{ParameterError, PictureError, Raise, SizeError, file_error, whole};
 use crate::pickle::reduced;
 use noisefloor::Rgb;
@@ -82,6 +83,7 @@ impl PyToneTable {
     #[new]
     #[pyo3(signature = (table, toe = 0.001, top = 1000.0))]
     fn new(table: &Bound<'_, PyAny>, toe: f32, top: f32) -> PyResult<Self> {
+        refuse_masked(table.as_borrowed())?;
         let array = table.py().import("numpy")?.call_method1("asarray", (table, "float32"));
         let array = array.map_err(|error| SizeError::new_err(format!("no array of colours: {error}")))?;
         let Ok(array) = array.cast::<PyArray4<f32>>() else {

@@ -688,6 +688,7 @@ class Errors(unittest.TestCase):
             (nf.BatchError, "tile -1 does not exist", lambda: session.push(-1, 1, black)),
             (nf.BatchError, "of another session: here it is", lambda: session.push(elsewhere, 1, black)),
             (nf.PictureError, "dtype uint8 are no radiance", lambda: session.push(0, 1, bytes_of)),
+            (nf.PictureError, "masked", lambda: session.push(0, 1, np.ma.masked_less(np.zeros((EDGE, EDGE, 3)), 1))),
             (nf.PictureError, "dtype int64", lambda: session.push(0, 1, bytes_of.astype(int))),
             (nf.PictureError, "dtype uint8", lambda: nf.metrics(bytes_of, bytes_of)),
             (nf.PictureError, "dtype uint8", lambda: nf.judge(bytes_of, 8, bytes_of, 8)),

@@ -1,5 +1,6 @@
-//! Spectra as linear Rec.709 colours.
+//! Spectra, and colours of other spaces, as linear Rec.709 colours.
 
+use glam::{DMat3, DVec3};
 use noisefloor::Rgb;
 
 /// First wavelength of [`CIE`] in nanometres, and the step between its rows.
@@ -74,6 +75,59 @@ pub(crate) fn of_xyz(xyz: [f64; 3]) -> Rgb {
 fn linear(xyz: [f64; 3]) -> [f64; 3] {
     RGB_OF_XYZ.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
 }
+
+/// The space of a colour's three numbers, as pbrt 4 names them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum ColourSpace {
+    /// Linear Rec.709, as everything here.
+    #[default]
+    Srgb,
+    Rec2020,
+    /// Of displays, with a white of D65.
+    DciP3,
+    /// AP0, whose white is D60.
+    Aces,
+}
+
+impl ColourSpace {
+    /// The space called so by pbrt's `ColorSpace`, which takes any case.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        let spaces = [
+            ("srgb", Self::Srgb),
+            ("rec2020", Self::Rec2020),
+            ("dci-p3", Self::DciP3),
+            ("aces2065-1", Self::Aces),
+        ];
+        spaces.into_iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, space)| space)
+    }
+
+    /// A colour of this space as one of Rec.709. A factor of 1 stays white; light of 1 is the white of the space.
+    /// Channels that would be negative are zero.
+    pub(crate) fn to_rec709(self, colour: Rgb, quantity: Quantity) -> Rgb {
+        let (primaries, white) = match self {
+            Self::Srgb => return colour,
+            // ITU-R BT.2020, table 3
+            Self::Rec2020 => ([[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]], D65),
+            // SMPTE EG 432-1
+            Self::DciP3 => ([[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]], D65),
+            // SMPTE ST 2065-1
+            Self::Aces => ([[0.7347, 0.2653], [0.0, 1.0], [0.0001, -0.0770]], [0.321_68, 0.337_67]),
+        };
+        // Linear RGB → XYZ, white having a Y of 1 (SMPTE RP 177)
+        let [red, green, blue] = primaries.map(|[x, y]| DVec3::new(x, y, 1.0 - x - y));
+        let columns = DMat3::from_cols(red, green, blue);
+        let xyz_of = |[x, y]: [f64; 2]| DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
+        let to_xyz = columns * DMat3::from_diagonal(columns.inverse() * xyz_of(white));
+        let rec709 = |colour: DVec3| linear((to_xyz * colour).to_array());
+        let found = rec709(DVec3::from_array(colour.map(f64::from)));
+        let light = quantity == Quantity::Light && white != D65;
+        let white = if light { [1.0; 3] } else { rec709(DVec3::ONE) };
+        std::array::from_fn(|i| (found[i] / white[i]).max(0.0) as f32)
+    }
+}
+
+/// The white of Rec.709.
+const D65: [f64; 2] = [0.3127, 0.3290];
 
 /// Integrates a spectrum against the colour matching functions in steps of a nanometre.
 fn integrate(at: impl Fn(f64) -> f64, quantity: Quantity) -> Rgb {
@@ -264,6 +318,28 @@ mod tests {
         let [r, g, b] = of_black_body(15_000.0);
         assert!(b > g && g > r);
         assert_eq!(of_black_body(*TEMPERATURES.start()), [0.0; 3]);
+    }
+
+    /// ITU-R BT.2087, table 2, and the matrices of P3 and AP0 without adaptation (colour-science 0.4.6).
+    #[test]
+    fn spaces_are_the_published_ones() {
+        for (space, green) in [
+            (ColourSpace::Rec2020, [0.0, 1.1329, 0.0]),
+            (ColourSpace::DciP3, [0.0, 1.0421, 0.0]),
+            (ColourSpace::Srgb, [0.0, 1.0, 0.0]),
+        ] {
+            close(space.to_rec709([0.0, 1.0, 0.0], Quantity::Light), green, 1e-3);
+            close(space.to_rec709([1.0; 3], Quantity::Light), [1.0; 3], 1e-6);
+            close(space.to_rec709([1.0; 3], Quantity::Factor), [1.0; 3], 1e-6);
+        }
+        // What lies inside both: BT.2087 of (0.5, 0.5, 0.25)
+        let mixed = ColourSpace::Rec2020.to_rec709([0.5, 0.5, 0.25], Quantity::Factor);
+        close(mixed, [0.5183, 0.5022, 0.2206], 1e-3);
+        let d60 = of_illuminant("acesD60").unwrap();
+        close(ColourSpace::Aces.to_rec709([1.0; 3], Quantity::Light), d60, 1e-3);
+        close(ColourSpace::Aces.to_rec709([1.0; 3], Quantity::Factor), [1.0; 3], 1e-6);
+        assert_eq!(ColourSpace::named("Rec2020"), Some(ColourSpace::Rec2020));
+        assert_eq!(ColourSpace::named("acescg"), None);
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! Files that a scene file names, how much of them is read, and what was in them.
 
 use crate::error::{LoadError, Place};
+use noisefloor::internal::stand_in;
+pub(crate) use noisefloor::internal::{lines, text};
 use noisefloor::source::SourceIdentity;
 use noisefloor_ptwne::check_memory;
-use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
@@ -18,6 +20,14 @@ const EACH_BYTE_OF_TREES: u64 = 32;
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
 /// Most bytes of all files, each counted as often as it is read.
 const MAX_BYTES: u64 = 1 << 34;
+/// What compressed data may become: so many bytes in any scene, and so many for each byte of its files. Deflate makes
+/// at most 1032 of one byte and meshopt 64, but meshes at most some 30 (those of Draco). A limit on each part alone
+/// would let a short file name a part any number of times.
+const FREE_INFLATED: u64 = 1 << 26;
+const INFLATED_A_BYTE: u64 = 256;
+/// The same for pixels of pictures, of which deflate makes 344 from a byte if they are RGB.
+const FREE_PIXELS: u64 = 1 << 25;
+const PIXELS_A_BYTE: u64 = 512;
 /// Most folders that a scene may add to those where its files are looked for.
 const MAX_FOLDERS: u64 = 64;
 
@@ -32,6 +42,12 @@ pub(crate) struct Folder {
     contents: RefCell<SourceIdentity>,
     /// Bytes that were read, those of a file that is read again counted again.
     bytes: Cell<u64>,
+    /// The files that were read, and the bytes that they have together.
+    distinct: RefCell<HashSet<PathBuf>>,
+    distinct_bytes: Cell<u64>,
+    /// What compressed data became so far, in bytes and in pixels.
+    inflated: Cell<u64>,
+    pixels: Cell<u64>,
 }
 
 impl Folder {
@@ -46,7 +62,16 @@ impl Folder {
         };
         let root = root.map_or_else(|| shared(&path), Path::to_owned);
         let contents = RefCell::new(SourceIdentity::new(options));
-        Self { root, searched: vec![path], contents, bytes: Cell::new(0) }
+        Self {
+            root,
+            searched: vec![path],
+            contents,
+            bytes: Cell::new(0),
+            distinct: RefCell::default(),
+            distinct_bytes: Cell::new(0),
+            inflated: Cell::new(0),
+            pixels: Cell::new(0),
+        }
     }
 
     /// Adds a folder, relative to the scene's own, in which to look for files.
@@ -105,6 +130,9 @@ impl Folder {
         let bytes = read(path, limit, place)?;
         self.bytes.set(self.bytes.get().saturating_add(bytes.len() as u64));
         place.clone().at_most("bytes of files so far", self.bytes.get(), MAX_BYTES)?;
+        if self.distinct.borrow_mut().insert(path.to_owned()) {
+            self.distinct_bytes.set(self.distinct_bytes.get() + bytes.len() as u64);
+        }
         if let Some(instead) = stand_in(&bytes) {
             return Err(Place::file(path).bad(instead));
         }
@@ -112,6 +140,34 @@ impl Folder {
         let name = path.strip_prefix(&self.searched[0]).unwrap_or(path).display().to_string();
         self.contents.borrow_mut().add(name, &bytes);
         Ok(bytes)
+    }
+
+    /// Counts bytes that compressed data becomes, before it does.
+    ///
+    /// # Errors
+    /// [`LoadError::TooLarge`] if all together are out of proportion to the files.
+    pub(crate) fn inflate(&self, bytes: u64, place: &Place) -> Result<(), LoadError> {
+        self.inflated.set(self.inflated.get().saturating_add(bytes));
+        place.clone().at_most("inflated bytes so far", self.inflated.get(), self.most_inflated())
+    }
+
+    /// How many bytes compressed data may still become.
+    pub(crate) fn left(&self) -> u64 {
+        self.most_inflated().saturating_sub(self.inflated.get())
+    }
+
+    fn most_inflated(&self) -> u64 {
+        self.distinct_bytes.get().saturating_mul(INFLATED_A_BYTE).saturating_add(FREE_INFLATED)
+    }
+
+    /// Counts pixels of a picture, before they are decoded.
+    ///
+    /// # Errors
+    /// As [`Self::inflate`].
+    pub(crate) fn draw(&self, pixels: u64, place: &Place) -> Result<(), LoadError> {
+        self.pixels.set(self.pixels.get().saturating_add(pixels));
+        let most = self.distinct_bytes.get().saturating_mul(PIXELS_A_BYTE).saturating_add(FREE_PIXELS);
+        place.clone().at_most("pixels of pictures so far", self.pixels.get(), most)
     }
 
     /// Digests of all files that were read.
@@ -172,44 +228,6 @@ fn is_private_to_a_collection(folder: &Path, home: Option<&Path>) -> bool {
 pub(crate) fn has_memory(bytes: u64, each: u64, place: &Place) -> Result<(), LoadError> {
     let bytes = usize::try_from(bytes.saturating_mul(each)).unwrap_or(usize::MAX);
     check_memory(bytes).map_err(|cause| LoadError::Scene { place: place.clone(), cause })
-}
-
-/// What a file holds instead of itself, if that is known, and what to do.
-fn stand_in(bytes: &[u8]) -> Option<&'static str> {
-    // The first line of a pointer (git-lfs, docs/spec.md); of a locked file of git-annex, its key
-    if bytes.starts_with(b"version https://git-lfs.github.com/spec/") {
-        return Some("this is a Git LFS pointer, not the file itself: run `git lfs pull`");
-    }
-    if bytes.len() < 1024 && bytes.starts_with(b"/annex/objects/") {
-        return Some("this is a pointer of git-annex, not the file itself: run `git annex get`");
-    }
-    let start = bytes.trim_ascii_start();
-    let is = |word: &[u8]| start.get(..word.len()).is_some_and(|found| found.eq_ignore_ascii_case(word));
-    (is(b"<!doctype html") || is(b"<html"))
-        .then_some("this is a web page (HTML), not the file itself: download that again")
-}
-
-/// The text of a file: UTF-8, or UTF-16 with a byte order mark, or else Latin-1, in which any bytes are text.
-pub(crate) fn text(bytes: &[u8]) -> Cow<'_, str> {
-    let words = |word: fn([u8; 2]) -> u16| -> String {
-        let words = bytes[2..].chunks_exact(2).map(|pair| word([pair[0], pair[1]]));
-        char::decode_utf16(words).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
-    };
-    match bytes {
-        [0xff, 0xfe, ..] => words(u16::from_le_bytes).into(),
-        [0xfe, 0xff, ..] => words(u16::from_be_bytes).into(),
-        _ => {
-            let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-            let latin_1 = || bytes.iter().map(|b| *b as char).collect::<String>();
-            std::str::from_utf8(bytes).map_or_else(|_| latin_1().into(), Cow::Borrowed)
-        }
-    }
-}
-
-/// The lines of a text, which end by \n, \r\n, or by \r alone, as on old Macs.
-pub(crate) fn lines(text: &str) -> impl Iterator<Item = &str> {
-    let end = if text.contains('\n') { '\n' } else { '\r' };
-    text.split(end).map(|line| line.strip_suffix('\r').unwrap_or(line))
 }
 
 /// Reads a regular file.

@@ -53,6 +53,15 @@ impl Triangles {
         }
     }
 
+    /// The area of all triangles together, whose indices [`Self::check`] has checked.
+    pub(crate) fn area(&self) -> f64 {
+        let doubled = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|i| Vec3::from_array(self.positions[i as usize]).as_dvec3());
+            (b - a).cross(c - a).length()
+        };
+        self.indices.iter().map(doubled).sum::<f64>() / 2.0
+    }
+
     /// Moves positions and normals.
     pub(crate) fn transform(&mut self, to_world: DMat4) {
         for position in &mut self.positions {

@@ -18,8 +18,10 @@ use std::path::Path;
 /// Memory for what a decoder keeps besides the pixels: rows, profiles, text.
 const MAX_EXTRA: u64 = 64 << 20;
 /// Most pixels that a byte of a file can stand for: deflate packs at best 1032:1, and a pixel has at least
-/// one bit. The other formats pack less, but for WebP, of which a picture of one colour has no bits.
+/// one bit. The other formats pack less, but for WebP: a picture of one colour has no bits, whatever its size, and may
+/// have the second number.
 const PIXELS_A_BYTE: u64 = 1032 * 8;
+const PLAIN_PIXELS: u64 = 1 << 24;
 
 /// A picture as its file has it.
 #[derive(Debug)]
@@ -57,11 +59,12 @@ pub(crate) fn read(folder: &Folder, path: &Path, place: &Place) -> Result<Pictur
         [b'P', b'F' | b'f', b'\n' | b'\r', ..] => noisefloor_image::read_pfm(path),
         _ => {
             let tga = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("tga"));
-            return decode_as(&bytes, tga.then_some(ImageFormat::Tga), &here);
+            return decode_as(folder, &bytes, tga.then_some(ImageFormat::Tga), &here);
         }
     };
     let image = linear.map_err(|e| here.clone().bad(e))?;
     check_size(image.width as u64, image.height as u64, &here)?;
+    folder.draw((image.width * image.height) as u64, &here)?;
     Ok(Picture { width: image.width, height: image.height, samples: Samples::Linear(image.pixels) })
 }
 
@@ -69,12 +72,17 @@ pub(crate) fn read(folder: &Folder, path: &Path, place: &Place) -> Result<Pictur
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn decode(bytes: &[u8], place: &Place) -> Result<Picture, LoadError> {
-    decode_as(bytes, None, place)
+pub(crate) fn decode(folder: &Folder, bytes: &[u8], place: &Place) -> Result<Picture, LoadError> {
+    decode_as(folder, bytes, None, place)
 }
 
 /// As [`decode`], of a format that is known, or else has a mark.
-fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result<Picture, LoadError> {
+fn decode_as(
+    folder: &Folder,
+    bytes: &[u8],
+    format: Option<ImageFormat>,
+    place: &Place,
+) -> Result<Picture, LoadError> {
     let broken = |e: image::ImageError| place.clone().bad(format!("the picture is broken: {e}"));
     // A Radiance picture begins with `#?` and any word: RGBE, RADIANCE, rtrace. The decoder knows one
     let renamed = bytes.strip_prefix(b"#?").map(|rest| {
@@ -83,20 +91,23 @@ fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result
     });
     let bytes = renamed.as_deref().unwrap_or(bytes);
     let format = image::guess_format(bytes).ok().or(format);
-    let (reader, length) = (Cursor::new(bytes), bytes.len());
+    let reader = Cursor::new(bytes);
+    let most = (bytes.len() as u64).saturating_mul(PIXELS_A_BYTE);
+    let most = if format == Some(ImageFormat::WebP) { most.max(PLAIN_PIXELS) } else { most };
+    let room = Room { bytes: bytes.len(), most, folder, place };
     // The decoders are other people's code over hostile bytes: where one of them panics, the file is broken,
     // and the program that reads it continues. No state outlives the call.
     let decoded = catch_unwind(AssertUnwindSafe(|| match format {
         Some(ImageFormat::Png) => {
             let mut limits = Limits::no_limits();
             limits.max_alloc = Some(MAX_EXTRA);
-            pixels(PngDecoder::with_limits(reader, limits).map_err(broken)?, length, place)
+            pixels(PngDecoder::with_limits(reader, limits).map_err(broken)?, room)
         }
-        Some(ImageFormat::Jpeg) => pixels(JpegDecoder::new(reader).map_err(broken)?, length, place),
-        Some(ImageFormat::Hdr) => pixels(HdrDecoder::new(reader).map_err(broken)?, length, place),
-        Some(ImageFormat::WebP) => pixels(WebPDecoder::new(reader).map_err(broken)?, usize::MAX, place),
-        Some(ImageFormat::Bmp) => pixels(BmpDecoder::new(reader).map_err(broken)?, length, place),
-        Some(ImageFormat::Tga) => pixels(TgaDecoder::new(reader).map_err(broken)?, length, place),
+        Some(ImageFormat::Jpeg) => pixels(JpegDecoder::new(reader).map_err(broken)?, room),
+        Some(ImageFormat::Hdr) => pixels(HdrDecoder::new(reader).map_err(broken)?, room),
+        Some(ImageFormat::WebP) => pixels(WebPDecoder::new(reader).map_err(broken)?, room),
+        Some(ImageFormat::Bmp) => pixels(BmpDecoder::new(reader).map_err(broken)?, room),
+        Some(ImageFormat::Tga) => pixels(TgaDecoder::new(reader).map_err(broken)?, room),
         _ => {
             let what = match bytes {
                 [0xab, b'K', b'T', b'X', ..] => "a KTX2 picture (KHR_texture_basisu)",
@@ -108,13 +119,28 @@ fn decode_as(bytes: &[u8], format: Option<ImageFormat>, place: &Place) -> Result
     decoded.unwrap_or_else(|_| Err(place.clone().bad("the picture is broken: its decoder gave up")))
 }
 
-/// The pixels behind a decoder that has read the header of a file of `bytes` bytes.
-fn pixels(decoder: impl ImageDecoder, bytes: usize, place: &Place) -> Result<Picture, LoadError> {
+/// How many pixels a file may have.
+#[derive(Clone, Copy)]
+struct Room<'a> {
+    /// Length of the file.
+    bytes: usize,
+    /// Most pixels that as many bytes can stand for.
+    most: u64,
+    /// Counts those of all pictures.
+    folder: &'a Folder,
+    place: &'a Place,
+}
+
+/// The pixels behind a decoder that has read the header of a file.
+fn pixels(decoder: impl ImageDecoder, room: Room<'_>) -> Result<Picture, LoadError> {
+    let Room { bytes, most, folder, place } = room;
     let (width, height) = decoder.dimensions();
     check_size(u64::from(width), u64::from(height), place)?;
-    if u64::from(width) * u64::from(height) > (bytes as u64).saturating_mul(PIXELS_A_BYTE) {
+    let count = u64::from(width) * u64::from(height);
+    if count > most {
         return Err(place.clone().bad(format!("{bytes} bytes cannot hold {width}×{height} pixels")));
     }
+    folder.draw(count, place)?;
     let image = DynamicImage::from_decoder(decoder)
         .map_err(|e| place.clone().bad(format!("the picture is broken: {e}")))?;
     let samples = match image {

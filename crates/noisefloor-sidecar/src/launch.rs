@@ -49,6 +49,7 @@ impl Launch {
             width: job.size.map(|(width, _)| width),
             height: job.size.map(|(_, height)| height),
             max_depth: job.max_depth,
+            frame: job.frame,
             threads: job.threads.map(|n| n.get()),
             options: &options.options,
         };

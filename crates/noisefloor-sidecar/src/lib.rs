@@ -42,8 +42,8 @@
 //! | `filter` | payload: one picture |
 //! | `quit` | the process ends after its reply |
 //!
-//! `init` has `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `threads` (or null) and
-//! `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
+//! `init` has `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `frame` (of a scene that holds
+//! several), `threads` (or null) and `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
 //! the reply's `samples` has a count for each: at most as many as requested, unless `late` in the reply to
 //! `init` says how many samples, over all pixels of a tile, the renderer takes before it can stop.
 //!

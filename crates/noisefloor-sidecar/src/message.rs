@@ -16,6 +16,7 @@ pub(crate) struct Init<'a> {
     pub(crate) width: Option<usize>,
     pub(crate) height: Option<usize>,
     pub(crate) max_depth: Option<u32>,
+    pub(crate) frame: Option<i32>,
     pub(crate) threads: Option<usize>,
     pub(crate) options: &'a BTreeMap<String, String>,
 }

@@ -47,6 +47,8 @@ pub struct Job {
     /// Longest path, in segments: 1 is directly visible light, 2 is direct lighting; the scene's own if
     /// `None`.
     pub max_depth: Option<u32>,
+    /// The frame of a scene that holds several; the scene's own if `None`. Renderers whose scenes hold one ignore it.
+    pub frame: Option<i32>,
     /// Number of threads; the renderer's choice if `None`.
     pub threads: Option<NonZeroUsize>,
     /// Time limit for one call, including the one that loads the scene.
@@ -57,7 +59,15 @@ impl Job {
     /// A scene with its own size and depth, seed 1 and [`DEFAULT_TIMEOUT`].
     pub fn new(scene: impl Into<PathBuf>) -> Self {
         let scene = scene.into();
-        Self { scene, seed: 1, size: None, max_depth: None, threads: None, timeout: DEFAULT_TIMEOUT }
+        Self {
+            scene,
+            seed: 1,
+            size: None,
+            max_depth: None,
+            frame: None,
+            threads: None,
+            timeout: DEFAULT_TIMEOUT,
+        }
     }
 }
 

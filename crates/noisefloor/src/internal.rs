@@ -1,12 +1,14 @@
 //! What other crates of this workspace share with this one; no part of its public interface, and without
-//! promises. Nothing in this crate uses it.
+//! promises.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 pub use crate::container::{FileFault, Format};
 pub use crate::display::ROUNDING_LUMINANCE;
 pub use crate::evidence::{HALO, held};
 pub use crate::model::familiarity::nearest;
+pub use crate::text::{lines, stand_in, text};
 pub use crate::tile::check_image;
 
 /// Makes text from a file or another program safe to print on a terminal.
@@ -33,6 +35,29 @@ fn unsafe_to_print(c: char) -> bool {
     let control = c.is_control() && !matches!(c, '\n' | '\t');
     control
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// Names of files by which they can be told apart: each its own, with as many of its folders as it takes.
+///
+/// ```
+/// use std::path::Path;
+/// let names = noisefloor::internal::told_apart(&["a/x/1.exr", "b/x/1.exr", "b/2.exr"].map(Path::new));
+/// assert_eq!(names, ["a/x/1.exr", "b/x/1.exr", "2.exr"]);
+/// ```
+pub fn told_apart(paths: &[&Path]) -> Vec<String> {
+    let parts: Vec<Vec<String>> = paths
+        .iter()
+        .map(|path| path.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect())
+        .collect();
+    let named = |parts: &[String], length: usize| parts[parts.len() - length.min(parts.len())..].join("/");
+    let name = |own: &Vec<String>| {
+        let twins =
+            |length: usize| parts.iter().filter(|other| named(other, length) == named(own, length)).count();
+        // The same file twice stays twice
+        let enough = (1..=own.len()).find(|length| twins(*length) <= twins(own.len())).unwrap_or(1);
+        named(own, enough)
+    };
+    parts.iter().map(name).collect()
 }
 
 #[cfg(test)]

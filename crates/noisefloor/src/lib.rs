@@ -53,6 +53,7 @@ pub mod session;
 pub mod source;
 pub mod stills;
 pub mod svm;
+mod text;
 pub mod tile;
 pub mod tune;
 mod unmet;

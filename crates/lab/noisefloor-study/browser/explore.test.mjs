@@ -271,3 +271,73 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await page.getByText("1 kept in explore.sqlite").waitFor();
   await page.getByText("People of the table").waitFor();
 });
+
+test("pictures are enlarged, brightened and set beside one another, by keyboard", async (t) => {
+  const { page } = await open(t, EXPLORER, LARGE);
+  await empty(page);
+  await drop(page, stack);
+  await page.getByText("do not show whether").waitFor();
+  await page.locator("#samples").selectOption("independent");
+  await page.getByText("tiles have converged at").waitFor();
+
+  // Small pictures are enlarged by whole factors; tiles go with them
+  const width = (id) => page.locator(id).evaluate((element) => element.getBoundingClientRect().width);
+  const own = await page.locator("#picture").evaluate((canvas) => canvas.width);
+  const zoom = async () => Number(/×(\d)/.exec(await page.locator("#zoom-now").textContent())[1]);
+  await until("it is enlarged", async () => (await zoom()) > 1);
+  assert.equal(await width("#picture"), own * (await zoom()));
+  await page.getByText("Enlarged ×").waitFor();
+  await page.keyboard.press("1");
+  await until("pixel by pixel", async () => (await width("#picture")) === own);
+  const tile_width = await tile(page, 0).evaluate((button) => button.getBoundingClientRect().width);
+  await page.keyboard.press("+");
+  await until("twice as large", async () => (await width("#picture")) === 2 * own);
+  assert.equal(await tile(page, 0).evaluate((button) => button.getBoundingClientRect().width), 2 * tile_width);
+
+  // Exposure is that of linear light: a stop doubles what is not white
+  const mean = (id) =>
+    page.locator(id).evaluate((canvas) => {
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const sums = [0, 0, 0];
+      data.forEach((value, at) => (at % 4 < 3 ? (sums[at % 4] += value) : null));
+      return sums.map((sum) => (4 * sum) / data.length);
+    });
+  const before = await mean("#picture");
+  await page.keyboard.press("Shift+E");
+  await page.keyboard.press("Shift+E");
+  await page.getByText("-1 stops").waitFor();
+  await until("it is darker", async () => (await mean("#picture"))[1] < before[1] - 5);
+  await page.keyboard.press("o");
+  await until("it is as before", async () => (await mean("#picture"))[1] === before[1]);
+
+  // One channel of three
+  await page.keyboard.press("g");
+  await until("it is grey", async () => new Set(await mean("#picture")).size === 1);
+  assert.equal((await mean("#picture"))[0], before[1]);
+  await page.keyboard.press("c");
+  await until("it has colours again", async () => (await mean("#picture"))[0] === before[0]);
+
+  // The other picture: flipped, then split where the pointer is
+  await page.keyboard.press("x");
+  await page.locator("#beside").waitFor();
+  const name = page.locator("#name");
+  const other_name = await name.textContent();
+  await page.keyboard.press("x");
+  await until("the first again", () => page.locator("#beside").isHidden());
+  assert.notEqual(await name.textContent(), other_name);
+  await page.keyboard.press("s");
+  await page.locator("#split").waitFor({ state: "attached" });
+  const box = await page.locator("#frame").boundingBox();
+  await page.mouse.move(box.x + box.width / 4, box.y + 10);
+  await until("the line follows", async () =>
+    /inset\(0px 0px 0px 2[45]/.test(await page.locator("#beside").evaluate((e) => getComputedStyle(e).clipPath)),
+  );
+  await shot(page, "explore-split");
+  await page.keyboard.press("s");
+
+  // Samples per pixel over the tiles
+  await page.keyboard.press("m");
+  assert.match(await tile(page, 0).textContent(), /spp/);
+  await shot(page, "explore-needs");
+  await accessible(page, "viewer");
+});

@@ -28,9 +28,11 @@ use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{delete, get, post, put};
 use gallery::Gallery;
+use noisefloor::internal::told_apart;
 use noisefloor_pages::http::{self, Exposure, Guard, Listening};
 use std::future::Future;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 /// A bound server, ready to run.
@@ -52,9 +54,10 @@ impl ExploreServer {
         exposure: &Exposure,
     ) -> Result<Self, StudyError> {
         let mut gallery = Gallery::new(setup.tile);
-        for path in &setup.pictures {
+        let names = told_apart(&setup.pictures.iter().map(PathBuf::as_path).collect::<Vec<_>>());
+        for (path, name) in setup.pictures.iter().zip(names) {
             gallery
-                .add(GalleryPicture::read(path)?)
+                .add(GalleryPicture::read(path)?.called(name))
                 .map_err(|error| StudyError::Explore(error.to_string()))?;
         }
         let kept = Arc::new(Disagreements::open(&setup.database)?);

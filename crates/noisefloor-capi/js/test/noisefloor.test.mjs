@@ -43,6 +43,20 @@ function render(session, random = noise(7)) {
   return session.states();
 }
 
+test("options that there are not are errors", () => {
+  for (const [wrong, name] of [
+    [{ minspp: 20 }, "minspp"],
+    [{ toneMapping: { curve: "linear", exposur: 2 } }, "toneMapping.exposur"],
+    [{ audience: { slop: 2 } }, "audience.slop"],
+  ]) {
+    assert.throws(
+      () => new Session(32, 32, wrong),
+      (error) => error.code === "ARGUMENT" && error.message.includes(`no option ${name};`),
+    );
+  }
+  new Session(32, 32, { maxSpp: undefined }).close();
+});
+
 test("a picture is rendered until all tiles are done", () => {
   const session = new Session(96, 80, options);
   assert.equal(session.tiles.length, 9);

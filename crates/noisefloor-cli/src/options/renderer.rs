@@ -15,7 +15,8 @@ use std::time::Duration;
 #[derive(Debug, Args)]
 pub struct RendererArgs {
     /// The renderer: `ptwne`, the built-in path tracer; `mitsuba`, `cycles`, `luxcore` (path tracing),
-    /// `luxcore-sobol`, `luxcore-metropolis` or `luxcore-bidir`, which `noisefloor doctor` installs; `exr`,
+    /// `luxcore-sobol`, `luxcore-metropolis` or `luxcore-bidir`, which `noisefloor doctor` installs (`blender` is
+    /// `cycles`); `exr`,
     /// which plays back a folder of pictures; or `command: PROGRAM …`, any program that renders into an EXR
     /// or PFM file. In its arguments, {scene} {seed} {spp} {out} are filled in, and {x0} {x1} {y0} {y1} if
     /// it can render tiles (x1 and y1 are exclusive).
@@ -112,7 +113,10 @@ impl RendererArgs {
         let scene = scene.map(JobPath::from);
         let scene_files = self.scene_files.check();
         let Self { seed, size, max_depth, .. } = self;
-        Ok((SourceJob { kind, scene, seed, same_seed: false, size, max_depth, scene_files }, resources))
+        Ok((
+            SourceJob { kind, scene, seed, same_seed: false, frame: None, size, max_depth, scene_files },
+            resources,
+        ))
     }
 
     /// Whether our own path tracer renders.

@@ -20,6 +20,8 @@ pub struct Adapter {
     pub threshold: Option<f64>,
     /// Whether it renders a part of such a picture as it is in the whole.
     pub crops: bool,
+    /// Whether one of its scene files holds all frames of a film.
+    pub frames: bool,
     /// What keeps it from being all it could be here, and what mends that.
     pub notes: fn() -> Vec<String>,
 }
@@ -33,6 +35,7 @@ pub const ADAPTERS: &[Adapter] = &[
         step: Schedule::STEP,
         threshold: None,
         crops: false,
+        frames: false,
         notes: noisefloor_mitsuba::notes,
     },
     luxcore("luxcore", |job| noisefloor_luxcore::open(job, Engine::Path, Sampler::Random)),
@@ -58,6 +61,7 @@ pub const ADAPTERS: &[Adapter] = &[
         step: 32,
         threshold: Some(0.2),
         crops: true,
+        frames: true,
         notes: Vec::new,
     },
 ];
@@ -66,7 +70,7 @@ const fn luxcore(name: &'static str, open: fn(&Job) -> Result<Sidecar, SidecarEr
     let (renderer, step) = (&noisefloor_luxcore::RENDERER, Schedule::STEP);
     // Its own default, 10/256: coarser ones stop at its first looks, whose number depends on how busy the machine is
     let threshold = Some(0.04);
-    Adapter { name, renderer, open, step, threshold, crops: false, notes: Vec::new }
+    Adapter { name, renderer, open, step, threshold, crops: false, frames: false, notes: Vec::new }
 }
 
 /// An adapter by its name: its functions have other addresses in every run.
@@ -93,7 +97,9 @@ impl FromStr for &'static Adapter {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let names = || ADAPTERS.iter().map(|adapter| adapter.name).collect::<Vec<_>>().join(", ");
-        let found = ADAPTERS.iter().find(|adapter| adapter.name == text);
+        // What people call the program that they have
+        let name = if text == "blender" { "cycles" } else { text };
+        let found = ADAPTERS.iter().find(|adapter| adapter.name == name);
         found.ok_or_else(|| format!("the other renderers are: {}", names()))
     }
 }
@@ -127,6 +133,7 @@ pub(super) fn open_adapter(
     let mut sidecar = Job::new(scene);
     (sidecar.seed, sidecar.size, sidecar.max_depth) = (job.seed, job.size, job.max_depth);
     (sidecar.threads, sidecar.timeout) = (resources.threads, resources.timeout);
+    sidecar.frame = job.frame;
     let source = (adapter.open)(&sidecar)?;
     let warnings = source.warnings().to_vec();
     Ok(Opened { source: Box::new(source), scene: stem(scene), warnings })

@@ -317,3 +317,30 @@ fn names_are_not_completed_as_files() {
         );
     }
 }
+
+/// Files of other programs, and words of other commands, are answered with what to type.
+#[test]
+fn what_is_elsewhere_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, words) in [
+        ("shot.blend", "--source cycles"),
+        ("shot.BLEND", "--source cycles"),
+        ("chair.obj", ".glb"),
+        ("set.usd", ".blend for --source cycles"),
+        ("hall.lxs", "--source luxcore"),
+        ("hall.cfg", "--source luxcore"),
+        ("shot.ass", "command: PROGRAM"),
+        ("a.exr", "noisefloor judge"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, "x").unwrap();
+        fail(&["render", text(&path)], &[name, words]);
+        fail(&["tune", text(&path)], &[name, words]);
+    }
+    fail(&["render", "--samples", "64"], &["--criterion spp:64"]);
+    fail(&["render", "--spp", "64"], &["--criterion spp:64"]);
+    fail(&["tune", "--spp", "64"], &["--knob samples", "--criterion spp:64"]);
+    fail(&["tune", "--samples", "64"], &["--knob samples"]);
+    // Blender's renderer by the name of the program; there is no such file
+    fail(&["render", "--source", "blender", "absent.blend"], &["Cycles"]);
+}

@@ -114,7 +114,7 @@ fn what_could_not_be_kept_is_said_at_once() {
     let ask = |out: &Path, more: &[&str], words: &[&str]| {
         fail(&[&["calibrate", "--listen", "127.0.0.1:0", "--out", text(out)], more].concat(), words);
     };
-    ask(folder.path(), &[], &["could not be kept", "is a folder"]);
+    ask(folder.path(), &[], &["nothing was asked", "cannot be kept", "is a folder"]);
     let file = folder.path().join("eyes.toml");
     ask(&file, &["--for", ""], &["empty"]);
     std::fs::write(&file, "version = 9\neyes = 2").unwrap();

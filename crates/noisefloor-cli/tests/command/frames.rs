@@ -195,7 +195,7 @@ fn a_forecast_renders_frames_that_the_sequence_keeps() {
     let forecast = json(&out.join("forecast.json"));
     assert_eq!(
         (&forecast["frames"], &forecast["known"]),
-        (&serde_json::json!([1, 9]), &serde_json::json!([1, 5, 9]))
+        (&serde_json::json!("1-9"), &serde_json::json!([1, 5, 9]))
     );
     // Three known frames, and lines between them
     let spp = [few[0].2, few[1].2, few[2].2];
@@ -384,7 +384,7 @@ fn what_is_typed_wins_over_a_file_and_nonsense_is_refused() {
     let report = json(&out.join("report.json"));
     assert_eq!((report["width"].as_u64(), report["samples"].as_u64()), (Some(32), Some(4 * 32 * 32)));
     fail(&["render", "--frames", "1-3", "hall.xml"], &["hall.xml", "{frame:04}"]);
-    fail(&["render", "--frames", "3-1", "hall.{frame}.xml"], &["frames 3 to 1"]);
+    fail(&["render", "--frames", "3-", "hall.{frame}.xml"], &["such as 1-240"]);
     fail(&["render", "--frames", "all", "hall.{frame}.xml"], &["1-240"]);
     fail(&["render", "--config", "absent.toml"], &["--config absent.toml"]);
     fs::write(&shot, "colour = \"green\"").unwrap();
@@ -429,4 +429,53 @@ fn a_draft_may_stop_below_a_hundred_samples() {
     assert_eq!(stderr(&output).matches("tiles of 32 pixels are small").count(), 1);
     let spp = column(&out.join("stops.csv"), "spp");
     assert!(spp.iter().any(|spp| (16..100).contains(&spp.parse::<u64>().unwrap())), "{spp:?}");
+}
+
+/// Steps, lists and frames before 0, as farms send them, and the other places where the number of a frame may stand.
+#[test]
+fn frames_are_named_as_farms_name_them() {
+    let folder = shots();
+    let shot = folder.path().join("shot.toml");
+    for frame in ["-001", "-002", "-0002"] {
+        fs::copy(folder.path().join("hall.0001.xml"), folder.path().join(format!("hall.{frame}.xml")))
+            .unwrap();
+    }
+    let render = |scene: &str, frames: &str, name: &str| {
+        let (scene, out) = (folder.path().join(scene), folder.path().join(name));
+        let args = ["render", "--config", text(&shot), "--frames", frames, text(&scene), "--out", text(&out)];
+        succeed(&[&args[..], &["--quiet", "--exposure", "1"]].concat());
+        let mut rows = csv::Reader::from_path(out.join("frames.csv")).unwrap();
+        let frames = rows.deserialize().map(|row| row.map(|row: (i32, bool, f64, f64, usize)| row.0));
+        (frames.collect::<Result<Vec<i32>, _>>().unwrap(), out)
+    };
+    assert_eq!(render("hall.{frame:04}.xml", "1-3x2", "steps").0, [1, 3]);
+    let (list, out) = render("hall.####.xml", "3,1", "hashes");
+    assert_eq!(list, [1, 3]);
+    assert!(out.join("0003/image.exr").exists());
+    assert_eq!(render("hall.%04d.xml", "-2--1", "before").0, [-2, -1]);
+    assert_eq!(render("hall.$F4.xml", "-2", "houdini").0, [-2]);
+    // Frames that are rendered alone have the samples that they have among others
+    let (_, steps) = render("hall.{frame:04}.xml", "3", "alone");
+    assert_eq!(picture(&steps, 3), picture(&folder.path().join("steps"), 3));
+
+    // One file that holds all frames
+    let xml = fs::read_to_string(folder.path().join("hall.0001.xml")).unwrap();
+    let lamp = xml.split("name=\"radiance\" value=\"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+    fs::write(folder.path().join("all.xml"), xml.replacen(&lamp, "$t", 1)).unwrap();
+    let (scene, out) = (folder.path().join("all.xml"), folder.path().join("all"));
+    let args =
+        ["render", "--config", text(&shot), "--frames", "1-2", text(&scene), "--out", text(&out), "--quiet"];
+    succeed(&[&args[..], &["--exposure", "1", "--define", "t={frame}"]].concat());
+    let mean = |frame| read_exr(&out.join(format!("{frame:04}/image.exr")));
+    assert!((mean(2) / mean(1) - 2.0).abs() < 0.1, "{} {}", mean(1), mean(2));
+    fail(&args, &["does not say where the number of the frame stands", "--define", ".blend"]);
+    for wrong in ["1-", "1-9x0", "--fps", "a"] {
+        fail(&["render", "--frames", wrong, text(&scene)], &["such as 1-240, 1-100x5, 1,5,9 or -3--1"]);
+    }
+}
+
+/// Mean radiance of a picture.
+fn read_exr(path: &Path) -> f32 {
+    let image = noisefloor_image::read_exr(path).unwrap();
+    image.pixels.iter().flatten().sum::<f32>() / (3 * image.pixels.len()) as f32
 }

@@ -119,6 +119,10 @@ fn every_command_of_the_lab_explains_itself() {
 fn shells_and_man_know_the_command() {
     let bash = succeed(&["completions", "bash"]);
     assert!(bash.contains("_noisefloor") && bash.contains("--max-spp"), "{bash}");
+    // Of `render` and of `tune`: scenes where one is asked for, and the words that options take
+    for words in ["cornell-box", "cycles", "art-students", "reinhard", "laptop", "relative-error"] {
+        assert!(bash.contains(words), "{words}");
+    }
     let folder = tempfile::tempdir().unwrap();
     succeed(&["man", folder.path().to_str().unwrap()]);
     let page = std::fs::read_to_string(folder.path().join("noisefloor-render.1")).unwrap();

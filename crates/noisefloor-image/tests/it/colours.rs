@@ -5,7 +5,7 @@ use flate2::{Compression as Level, write::ZlibEncoder};
 use moxcms::ColorProfile;
 use noisefloor::display::srgb_decode;
 use noisefloor_image::{
-    Picture, PictureError, read_exr, read_picture, read_picture_on, read_png, read_unread,
+    Picture, PictureError, ReadOptions, read_exr, read_picture, read_picture_with, read_png, read_unread,
 };
 use std::io::Write;
 use std::path::Path;
@@ -182,7 +182,7 @@ fn white_of_hlg_is_white() {
     let image = read_png(&path).unwrap();
     assert!(image.pixels[0].iter().all(|v| (v - 1.0).abs() < 0.01), "{:?}", image.pixels);
     assert_eq!(image.pixels[1], [0.0; 3]);
-    let warnings = read_unread(&path).unwrap().warnings();
+    let warnings = read_unread(&path, &ReadOptions::default()).unwrap().warnings();
     assert!(matches!(&warnings[..], [one] if one.contains("Rec.2020 primaries with HLG")), "{warnings:?}");
 }
 
@@ -194,7 +194,10 @@ fn displays_of_the_same_kind_get_the_codes() {
     let path = folder.path().join("a.png");
     let stored = [[10_000, 20_000, 30_000]];
     png_with(&path, &stored, &[(b"cICP", vec![9, 16, 0, 1])]);
-    let on = |viewing: &str| match read_picture_on(&path, &viewing.parse().unwrap(), 1000) {
+    let on = |viewing: &str| match read_picture_with(
+        &path,
+        &ReadOptions { viewing: viewing.parse().unwrap(), ..ReadOptions::default() },
+    ) {
         Ok(Picture::Display(image)) => Ok(image.pixels == stored.map(|p| p.map(|v| f32::from(v) / 65535.0))),
         Ok(Picture::Linear(_)) => panic!("a PNG"),
         Err(error) => Err(error.to_string()),
@@ -222,10 +225,21 @@ fn what_is_not_converted_is_refused_by_name() {
         ((b"iCCP", broken), "broken profile"),
         ((b"cHRM", chrm), "cHRM"),
         (gama(0.001), "0.001"),
+        // What cannot be read is no sRGB either
+        ((b"iCCP", b"any\0\0no deflate".to_vec()), "a chunk iCCP, which cannot be read"),
+        ((b"iCCP", b"any".to_vec()), "a chunk iCCP, which cannot be read"),
+        ((b"gAMA", vec![0; 4]), "a chunk gAMA, which cannot be read"),
+        ((b"gAMA", vec![1]), "a chunk gAMA, which cannot be read"),
+        ((b"cHRM", vec![0; 5]), "a chunk cHRM, which cannot be read"),
+        ((b"sRGB", vec![9]), "a chunk sRGB, which cannot be read"),
     ] {
         png_with(&path, &[[1; 3]], &[chunk]);
         let error = read_picture(&path).unwrap_err();
         assert!(matches!(&error, PictureError::Colours { .. }), "{error}");
         assert!(error.to_string().contains(what), "{error}");
     }
+    // But not where another chunk is believed
+    let profile = (b"iCCP", b"any\0\0no deflate".to_vec());
+    png_with(&path, &[[1; 3]], &[(b"cICP", vec![1, 13, 0, 1]), profile]);
+    read_picture(&path).unwrap();
 }

@@ -79,10 +79,18 @@ fn broken_ones_are_errors_that_say_where() {
         ("LUT_1D_SIZE 2\nDOMAIN_MIN nan 0 0\n", 2),
         ("LUT_1D_SIZE 2\n0 0 0\n1 1\n", 3),
         ("LUT_1D_SIZE 2\n0 0 0\n1 1 inf\n", 3),
-        ("LUT_1D_SIZE 2\n0 0 0\nDOMAIN_MAX 1 1 1\n", 3),
+        ("LUT_1D_SIZE 2\n0 0 0\nDOMAIN_MAX 1 1\n", 3),
+        ("LUT_1D_SIZE 2\n0 0 0\nnan 1 1\n", 3),
     ] {
         let error = error(text);
         assert!(matches!(error, CubeError::Line { line, .. } if line == at), "{text:?}: {error:?}");
+    }
+    assert!(error("lut_1d_size 2\nFOO 1\n").to_string().contains("the keyword \"FOO\" is not known"));
+    // Files that stand for others
+    let pointer = error("version https://git-lfs.github.com/spec/v1\noid sha256:aa\nsize 12\n").to_string();
+    assert!(pointer.contains("Git LFS pointer") && pointer.contains("git lfs pull"), "{pointer}");
+    for page in ["<!DOCTYPE html><html>", "\u{feff}\n<HTML>"] {
+        assert!(error(page).to_string().contains("web page"), "{page}");
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.cube");
@@ -131,4 +139,28 @@ fn a_lut_is_a_tone_mapping() {
     }
     assert_eq!(one, curve(&text("two"), LutInput::Linear));
     assert_ne!(one, curve(&text("one"), LutInput::Srgb));
+}
+
+/// One table in every spelling that programs write: ends of lines, encodings, ends of files, and the domain after it.
+#[test]
+fn odd_spellings_are_the_same_table() {
+    let plain = "LUT_1D_SIZE 2\nDOMAIN_MAX 2 2 2\n0 0 0\n1 0.5 0.25\n";
+    let known = parse_cube(plain.as_bytes()).unwrap();
+    assert!(near(known.map([2.0; 3]), [1.0, 0.5, 0.25]));
+    let wide = |order: fn(u16) -> [u8; 2], text: &str| -> Vec<u8> {
+        [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(order).collect()
+    };
+    let late = "LUT_1D_SIZE 2\n0 0 0\n1 0.5 0.25\nDOMAIN_MAX 2 2 2";
+    for (called, bytes) in [
+        ("CR", plain.replace('\n', "\r").into_bytes()),
+        ("CRLF", plain.replace('\n', "\r\n").into_bytes()),
+        ("UTF-16LE", wide(u16::to_le_bytes, plain)),
+        ("UTF-16BE", wide(u16::to_be_bytes, plain)),
+        ("^Z", [plain.as_bytes(), b"\x1a"].concat()),
+        ("NUL", [plain.as_bytes(), b"\0\n"].concat()),
+        ("lower case", plain.to_lowercase().into_bytes()),
+        ("domain last", late.as_bytes().to_vec()),
+    ] {
+        assert_eq!(parse_cube(&bytes).as_ref(), Ok(&known), "{called}");
+    }
 }

@@ -1,7 +1,10 @@
 use crate::util::{exr_claiming, exr_header, f32s, make_exr};
 use exr::prelude::{Compression, FlatSamples, IntegerBounds, f16};
 use image::{DynamicImage, ImageBuffer, ImageFormat};
-use noisefloor_image::{Picture, PictureError, read_exr, read_picture, read_png, write_png};
+use noisefloor_image::{
+    Picture, PictureError, ReadOptions, read_exr, read_picture, read_picture_with, read_png, read_unread,
+    write_png,
+};
 use std::path::PathBuf;
 
 fn scratch() -> (tempfile::TempDir, PathBuf) {
@@ -64,6 +67,79 @@ fn the_likeliest_layer_is_read() {
     ] {
         make_exr(&path, (1, 1), channels.concat(), Compression::ZIP16, (0, 0), None);
         assert_eq!(read_exr(&path).unwrap().pixels, [[value; 3]]);
+    }
+}
+
+/// The picture by its name, whatever the alphabet says; where no name tells, the error lists what there is.
+#[test]
+fn layers_are_chosen_by_what_they_are_called() {
+    let (_folder, path) = scratch();
+    let write = |layers: &[&str]| {
+        let names: Vec<[String; 3]> =
+            layers.iter().map(|l| ["R", "G", "B"].map(|c| format!("{l}.{c}"))).collect();
+        let channels = names.iter().enumerate();
+        let channels =
+            channels.flat_map(|(i, names)| names.each_ref().map(|name| (name.as_str(), f32s(&[i as f32]))));
+        make_exr(&path, (1, 1), channels.collect(), Compression::ZIP16, (0, 0), None);
+    };
+    for (layers, read) in [
+        (&["N", "rgba"][..], 1.0),
+        (&["AAcrypto00", "rgba"], 1.0),
+        (&["albedo", "image"], 1.0),
+        (&["A.Combined", "ViewLayer.Combined"], 1.0),
+        (&["ViewLayer.Combined", "Composite.Combined"], 1.0),
+        (&["ViewLayer.Denoising Albedo", "ViewLayer.Noisy Image", "ViewLayer.Combined"], 2.0),
+        (&["P", "Z", "crypto_object", "beauty"], 3.0),
+        (&["depth", "specular"], 1.0),
+        (&["N"], 0.0),
+    ] {
+        write(layers);
+        assert_eq!(read_exr(&path).unwrap().pixels, [[read; 3]], "{layers:?}");
+    }
+    for layers in [&["diffuse", "specular"][..], &["N", "albedo"], &["A.Combined", "B.Combined"]] {
+        write(layers);
+        let error = read_exr(&path).unwrap_err();
+        assert!(
+            matches!(&error, PictureError::Layers { found, .. } if *found == layers.join(", ")),
+            "{error}"
+        );
+        // And by name, each can be had
+        for (i, layer) in layers.iter().enumerate() {
+            let layer = Some(layer.to_uppercase());
+            let options = ReadOptions { layer, ..ReadOptions::default() };
+            let found = read_picture_with(&path, &options).unwrap().into_linear();
+            assert_eq!(found.pixels, [[i as f32; 3]]);
+            assert_eq!(read_unread(&path, &options).unwrap().layers[0], layers[i]);
+        }
+    }
+    let asked = |layer: &str| {
+        let options = ReadOptions { layer: Some(layer.to_owned()), ..ReadOptions::default() };
+        read_picture_with(&path, &options).map(|picture| picture.into_linear().pixels)
+    };
+    for layer in ["beauty", "Combined", ""] {
+        let error = asked(layer).unwrap_err().to_string();
+        assert!(error.contains("A.Combined, B.Combined"), "{error}");
+    }
+    write(&["ViewLayer.Combined", "ViewLayer.DiffCol"]);
+    assert_eq!(asked("diffcol").unwrap(), [[1.0; 3]]);
+}
+
+/// Files that stand for pictures say so.
+#[test]
+fn pointers_and_pages_are_named() {
+    let (_folder, path) = scratch();
+    for (bytes, want) in [
+        ("version https://git-lfs.github.com/spec/v1\noid sha256:aa\nsize 12\n", "git lfs pull"),
+        ("/annex/objects/SHA256E-s12--aa.exr\n", "git annex get"),
+        ("\n<!DOCTYPE html>\n<html></html>", "web page"),
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        for error in [read_exr(&path).unwrap_err(), read_picture(&path).map(drop).unwrap_err()] {
+            assert!(
+                matches!(error, PictureError::StandIn { .. }) && error.to_string().contains(want),
+                "{error}"
+            );
+        }
     }
 }
 

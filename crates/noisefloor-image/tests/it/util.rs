@@ -2,7 +2,7 @@ use exr::prelude::*;
 use std::path::Path;
 
 /// A channel of an EXR to make.
-pub(crate) type Named = (&'static str, FlatSamples);
+pub(crate) type Named<'n> = (&'n str, FlatSamples);
 
 pub(crate) fn encoding(compression: Compression) -> Encoding {
     Encoding { compression, ..Encoding::UNCOMPRESSED }
@@ -13,7 +13,7 @@ pub(crate) fn encoding(compression: Compression) -> Encoding {
 pub(crate) fn make_exr(
     path: &Path,
     size: (usize, usize),
-    channels: Vec<Named>,
+    channels: Vec<Named<'_>>,
     compression: Compression,
     at: (i32, i32),
     display: Option<IntegerBounds>,

@@ -136,6 +136,11 @@ pub async fn check(
 fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
     let headers = request.headers();
     let refuse = |status, what: &str, place: &str, do_: &str| Some(Refusal::new(status, what, place, do_));
+    // Which of two counts would be a matter of who reads them (RFC 9112, §3.2)
+    let twice = |name: &&str| headers.get_all(*name).iter().nth(1).is_some();
+    if let Some(name) = ["Host", "Origin", "Sec-Fetch-Site", "Content-Type"].iter().find(|name| twice(name)) {
+        return refuse(StatusCode::BAD_REQUEST, "the header is there twice", name, "send it once");
+    }
     let Some(host) = guard.known_host(headers) else {
         let do_ = "open the address that `noisefloor` printed, or the machine's address if it listens on all; \
             `study serve` and `explore` take further names with --allow-host";

@@ -44,6 +44,8 @@ impl<'a> Asset<'a> {
             Ok::<_, LoadError>(root)
         };
         let root = parsed()?;
+        // Lists of later versions are objects in version 1, which its types would not take
+        properties::check_version(path, &root)?;
         let unread = properties::unread(&root);
         let root: Root = match deserialize::from_value(root) {
             Ok(root) => root,
@@ -71,6 +73,11 @@ impl<'a> Asset<'a> {
     /// Bytes in all the files read so far: what is allocated stays in proportion to them.
     pub(super) fn bytes(&self) -> u64 {
         self.bytes.get()
+    }
+
+    /// Where its files lie, which counts what compressed data becomes.
+    pub(super) fn folder(&self) -> &Folder {
+        self.folder
     }
 
     /// The bytes of a buffer view that `place` names.

@@ -21,13 +21,17 @@ const VERTEX_BYTES: u64 = 1024;
 /// Bytes that a vertex or a triangle takes while it is inflated, about: tables of neighbours, and the numbers twice.
 const BYTES_EACH: u64 = 512;
 
+/// Those of them that stay, about.
+const KEPT_EACH: u64 = 32;
+
 /// What a primitive says of its data.
 struct Compressed {
     view: Index<View>,
     /// Number of an attribute in the data, by its name.
     attributes: BTreeMap<String, u32>,
     vertices: u64,
-    triangles: u64,
+    /// None if the primitive has no indices, whose triangles the data alone counts.
+    triangles: Option<u64>,
     place: Place,
 }
 
@@ -50,14 +54,21 @@ pub(super) fn inflate(asset: &mut Asset<'_>) -> Result<(), LoadError> {
     let mut elements = 0u64;
     for group in all.chunk_by(|(_, a), (_, b)| a.view.value() == b.view.value()) {
         let (_, first) = &group[0];
-        elements = elements.saturating_add(first.vertices).saturating_add(first.triangles);
+        let most = first.triangles.unwrap_or_else(|| asset.folder().left() / KEPT_EACH);
+        let own = first.vertices.saturating_add(most);
+        elements = elements.saturating_add(first.vertices).saturating_add(first.triangles.unwrap_or(0));
         first.place.clone().at_most(
             "compressed vertices and triangles so far",
             elements,
             MAX_SURFACES as u64,
         )?;
-        has_memory(first.vertices.saturating_add(first.triangles), BYTES_EACH, &first.place)?;
-        let mesh = decoded(asset, first)?;
+        let counted = first.vertices.saturating_add(first.triangles.unwrap_or(0));
+        asset.folder().inflate(counted.saturating_mul(KEPT_EACH), &first.place)?;
+        has_memory(own, BYTES_EACH, &first.place)?;
+        let mesh = decoded(asset, first, most)?;
+        if first.triangles.is_none() {
+            asset.folder().inflate((mesh.num_faces() as u64).saturating_mul(KEPT_EACH), &first.place)?;
+        }
         let faces: Vec<u8> =
             mesh.faces().iter().flatten().flat_map(|corner| corner.0.to_le_bytes()).collect();
         let triangles = asset.add_view(faces);
@@ -115,18 +126,25 @@ fn compressed(
     let attributes = extension.get("attributes").cloned().unwrap_or_default();
     let attributes =
         deserialize::from_value(attributes).map_err(|_| bad("it needs a number per attribute"))?;
-    let indices = primitive.indices.ok_or_else(|| bad("the primitive has no indices"))?;
-    let indices = asset.get(indices, "accessor", &place)?.count.0;
-    let triangles = count(mode(primitive, &place)?, indices);
+    let triangles = match primitive.indices {
+        Some(indices) => {
+            Some(count(mode(primitive, &place)?, asset.get(indices, "accessor", &place)?.count.0))
+        }
+        None => None,
+    };
     Ok(Some(Compressed { view, attributes, vertices: positions.count.0, triangles, place }))
 }
 
-/// The mesh in a buffer view, which has no more than its primitive says.
-fn decoded(asset: &Asset<'_>, compressed: &Compressed) -> Result<draco_core::Mesh, LoadError> {
-    let Compressed { view, vertices, triangles, place, .. } = compressed;
+/// The mesh in a buffer view, which has no more vertices than its primitive says, and at most so many triangles.
+fn decoded(
+    asset: &Asset<'_>,
+    compressed: &Compressed,
+    triangles: u64,
+) -> Result<draco_core::Mesh, LoadError> {
+    let Compressed { view, vertices, place, .. } = compressed;
     let limits = DecodeLimits::default()
         .with_max_points(*vertices)
-        .with_max_faces(*triangles)
+        .with_max_faces(triangles)
         .with_max_decoded_bytes(vertices.saturating_mul(VERTEX_BYTES));
     let data = asset.view(*view, place)?;
     // The one version of the extension; the decoder would try to make sense of later ones
@@ -154,10 +172,11 @@ fn decoded(asset: &Asset<'_>, compressed: &Compressed) -> Result<draco_core::Mes
 /// Checks that a mesh is what its primitive says, and that its triangles have corners.
 fn fits(mesh: &draco_core::Mesh, compressed: &Compressed) -> Result<(), LoadError> {
     let (points, faces) = (mesh.num_points() as u64, mesh.num_faces() as u64);
-    if (points, faces) != (compressed.vertices, compressed.triangles) {
+    let triangles = compressed.triangles.unwrap_or(faces);
+    if (points, faces) != (compressed.vertices, triangles) {
         return Err(compressed.place.clone().bad(format_args!(
-            "its Draco data has {points} vertices and {faces} triangles, but its accessors say {} and {}",
-            compressed.vertices, compressed.triangles
+            "its Draco data has {points} vertices and {faces} triangles, but its accessors say {} and {triangles}",
+            compressed.vertices
         )));
     }
     if mesh.faces().iter().flatten().any(|corner| u64::from(corner.0) >= points) {

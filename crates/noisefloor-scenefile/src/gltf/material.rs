@@ -115,7 +115,12 @@ impl<'m> Reader<'m, '_> {
         };
         let [base_texture, metal_texture, emissive_texture] =
             [base_texture, metal_texture, &source.emissive_texture].map(Option::as_ref);
-        let normals = source.normal_texture.as_ref().map(|normals| (normal_info(normals), normals.scale));
+        let mut normals = source.normal_texture.as_ref().map(|normals| (normal_info(normals), normals.scale));
+        // White changes no factor, but as a normal it would lean
+        if normals.as_ref().is_some_and(|(info, _)| !self.textures.has_image(info)) {
+            self.notes.warn(&self.place, "its normal map names no image: it is left out");
+            normals = None;
+        }
         let all = [base_texture, metal_texture, normals.as_ref().map(|n| &n.0), emissive_texture];
         self.sets[0] = all.into_iter().flatten().map(set).next();
         self.textures.first_set = self.sets[0].unwrap_or_default();

@@ -45,7 +45,10 @@ fn inflated(asset: &Asset<'_>, extension: &Value, place: &Place) -> Result<(Vec<
     };
     let data = asset.bytes_of(&compressed, place, || place.clone())?;
     let most = (data.len() as u64).saturating_mul(BYTES_A_BYTE);
-    place.clone().at_most("bytes of compressed data", count.saturating_mul(stride), most)?;
+    let becomes = count.saturating_mul(stride);
+    place.clone().at_most("bytes of compressed data", becomes, most)?;
+    // Any number of views may name the same data
+    asset.folder().inflate(becomes, place)?;
     let (stride, count) = (stride as usize, count as usize);
     let (mode, filter) = (word("mode"), word("filter"));
     let fits = match (mode, filter) {

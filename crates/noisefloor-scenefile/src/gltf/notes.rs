@@ -76,13 +76,8 @@ impl Notes {
     }
 }
 
-/// Checks that the file requires no later version of glTF and no extension that would be missed.
+/// Checks that the file requires no extension that would be missed.
 pub(super) fn check_required(asset: &Asset<'_>) -> Result<(), LoadError> {
-    let header = &asset.root.asset;
-    let version = header.min_version.as_ref().unwrap_or(&header.version);
-    if header.min_version.as_ref().is_some_and(|v| v != "2.0") || !version.starts_with("2.") {
-        return Err(Place::part(asset.path, "asset").unsupported(format_args!("version {version:?} of glTF")));
-    }
     let required = asset.root.extensions_required.iter();
     let missing: Vec<&str> = required.map(String::as_str).filter(|name| !KNOWN.contains(name)).collect();
     let (named, place) = (missing.join(", "), Place::part(asset.path, "extensionsRequired"));

@@ -1,7 +1,9 @@
 //! The properties of glTF 2.0: what of them is read, and what else a file has.
 
 use super::parts::name;
+use crate::{LoadError, Place};
 use gltf::json::{Root, Value, deserialize};
+use std::path::Path;
 
 /// The top-level arrays, and what one of their elements is called.
 const KINDS: [(&str, &str); 15] = [
@@ -134,6 +136,29 @@ fn drop_extras(value: &mut Value) {
             object.values_mut().for_each(drop_extras);
         }
         _ => {}
+    }
+}
+
+/// Checks that the file is of version 2, and requires no later one. Version 1 may leave out that it is.
+pub(super) fn check_version(path: &Path, root: &Value) -> Result<(), LoadError> {
+    let unsupported =
+        |version: &Value| Place::part(path, "asset").unsupported(format_args!("version {version} of glTF"));
+    let stated = |key: &str| root.get("asset").and_then(|asset| asset.get(key));
+    match stated("minVersion") {
+        Some(Value::String(version)) if version != "2.0" => {
+            return Err(unsupported(&version.as_str().into()));
+        }
+        _ => {}
+    }
+    match stated("version") {
+        Some(Value::String(version)) if version.starts_with("2.") => Ok(()),
+        // Not what version 2 writes, but meant so
+        Some(Value::Number(number)) if number.as_f64().is_some_and(|n| (2.0..3.0).contains(&n)) => Ok(()),
+        Some(version) => Err(unsupported(version)),
+        None if root.get("meshes").or(root.get("accessors")).is_some_and(Value::is_object) => {
+            Err(Place::file(path).unsupported("version 1 of glTF, whose meshes are no list,"))
+        }
+        None => Ok(()),
     }
 }
 

@@ -25,7 +25,12 @@ pub(super) fn joints(
     let skin = asset.get(index, "skin", place)?;
     let here = Place::part(asset.path, name("skin", index.value(), skin.name.as_deref()));
     let inverse = match skin.inverse_bind_matrices {
-        Some(accessor) => floats::<16>(asset, accessor, &here)?,
+        Some(accessor) => {
+            // Any number of skins may name the same matrices
+            let count = asset.get(accessor, "accessor", &here)?.count.0;
+            asset.folder().inflate(count.saturating_mul(64), &here)?;
+            floats::<16>(asset, accessor, &here)?
+        }
         None => vec![],
     };
     if skin.inverse_bind_matrices.is_some() && inverse.len() < skin.joints.len() {

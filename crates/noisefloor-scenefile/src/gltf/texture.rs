@@ -23,6 +23,9 @@ use std::sync::Arc;
 /// Most pixels of all images together: a small file can make a large image, and a file can name many.
 const MAX_PIXELS: u64 = 4 * MAX_TEXTURE_PIXELS as u64;
 
+/// The index that the types of the JSON give a texture without a source.
+const NO_IMAGE: usize = u32::MAX as usize;
+
 /// What the numbers of an image mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -188,20 +191,7 @@ impl<'a> Textures<'a> {
         let others = texture.extensions.iter().flat_map(|e| &e.others);
         notes.extensions(&here, others.map(|(name, _)| name).filter(|name| *name != WEBP));
         notes.extensions(place, info.extensions.iter().flat_map(|e| e.others.keys()));
-        // A texture without a source is one of an extension
-        let mut source = texture.source;
-        if source.value() >= asset.root.images.len() {
-            let webp = texture.extensions.as_ref().and_then(|e| e.others.get(WEBP)?.get("source")?.as_u64());
-            source = webp.and_then(|index| u32::try_from(index).ok()).map_or(source, Index::new);
-        }
-        if source.value() >= asset.root.images.len() {
-            let names = texture.extensions.iter().flat_map(|e| e.others.keys());
-            let names: Vec<&str> = names.map(String::as_str).collect();
-            if !names.is_empty() {
-                return Err(here.unsupported(format_args!("an image of only {}", names.join(", "))));
-            }
-        }
-        let Decoded { width, height, colour, .. } = self.decoded(source, &here, notes)?;
+        let (source, Decoded { width, height, colour, .. }) = self.image_of(texture, &here, notes)?;
         let default = Sampler::default();
         let sampler = match texture.sampler {
             Some(sampler) => asset.get(sampler, "sampler", &here)?,
@@ -220,7 +210,44 @@ impl<'a> Textures<'a> {
         let (pixels, factor) = (Pixels::Srgb8(colour), [1.0; 3]);
         let second = set(info) != self.first_set;
         let shown = ImageTexture { width, height, pixels, to_uv, factor, wrap, nearest, second };
-        Ok((source.value(), shown))
+        Ok((source, shown))
+    }
+
+    /// Whether a texture names an image. Blender leaves out that of a lost one.
+    pub(super) fn has_image(&self, info: &Info) -> bool {
+        self.asset
+            .root
+            .textures
+            .get(info.index.value())
+            .is_none_or(|t| !sources(t).is_empty() || is_foreign(t))
+    }
+
+    /// The first image of a texture that can be had, and its index: of a picture and the same as WebP, one may not have
+    /// been downloaded. A texture that names none is white.
+    fn image_of(
+        &mut self,
+        texture: &gltf::json::Texture,
+        place: &Place,
+        notes: &mut Notes,
+    ) -> Result<(usize, Decoded), LoadError> {
+        let sources = sources(texture);
+        if let (true, Some(extensions)) = (is_foreign(texture), &texture.extensions) {
+            let names: Vec<&str> = extensions.others.keys().map(String::as_str).collect();
+            return Err(place.clone().unsupported(format_args!("an image of only {}", names.join(", "))));
+        }
+        let mut missing = None;
+        for source in sources {
+            match self.decoded(source, place, notes) {
+                Err(error @ LoadError::Read { .. }) => missing = missing.or(Some(error)),
+                decoded => return Ok((source.value(), decoded?)),
+            }
+        }
+        if let Some(error) = missing {
+            return Err(error);
+        }
+        notes.warn(place, "it names no image: it is white");
+        let white = Decoded { width: 1, height: 1, colour: Arc::new([[255; 3]]), alpha: None };
+        Ok((NO_IMAGE, self.images.entry(NO_IMAGE).or_insert(white).clone()))
     }
 
     fn decoded(
@@ -236,8 +263,10 @@ impl<'a> Textures<'a> {
         let here = Place::part(self.asset.path, name("image", index.value(), image.name.as_deref()));
         notes.extensions(&here, image.extensions.iter().flat_map(|e| e.others.keys()));
         let picture = match (image.buffer_view, &image.uri) {
-            (Some(view), _) => picture::decode(self.asset.view(view, &here)?, &here)?,
-            (None, Some(uri)) => picture::decode(&self.asset.resolve(uri, &here)?, &here)?,
+            (Some(view), _) => picture::decode(self.asset.folder(), self.asset.view(view, &here)?, &here)?,
+            (None, Some(uri)) => {
+                picture::decode(self.asset.folder(), &self.asset.resolve(uri, &here)?, &here)?
+            }
             (None, None) => return Err(here.bad("it has neither a `bufferView` nor a `uri`")),
         };
         let rgba = match picture.samples {
@@ -262,6 +291,20 @@ impl<'a> Textures<'a> {
         self.pixels += pixels as u64;
         place.clone().at_most("pixels of images in all", self.pixels, MAX_PIXELS)
     }
+}
+
+/// The images that a texture names: a picture that anyone reads, and one of an extension.
+fn sources(texture: &gltf::json::Texture) -> Vec<Index<Image>> {
+    let webp = texture.extensions.as_ref().and_then(|e| e.others.get(WEBP)?.get("source")?.as_u64());
+    let webp = webp.map(|index| Index::new(u32::try_from(index).unwrap_or(u32::MAX - 1)));
+    let own = Some(texture.source).filter(|source| source.value() != NO_IMAGE);
+    own.into_iter().chain(webp).collect()
+}
+
+/// Whether the only image of a texture is that of an extension which is not read.
+fn is_foreign(texture: &gltf::json::Texture) -> bool {
+    let others = texture.extensions.iter().flat_map(|e| &e.others);
+    sources(texture).is_empty() && others.into_iter().any(|(_, value)| value.get("source").is_some())
 }
 
 /// A normal map as any texture. The types of the JSON leave its transform among unknown extensions.

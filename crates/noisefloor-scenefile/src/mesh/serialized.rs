@@ -2,6 +2,7 @@
 
 use super::Triangles;
 use crate::error::{LoadError, Place};
+use crate::files::Folder;
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 use std::path::Path;
@@ -28,7 +29,12 @@ const DOUBLE: u32 = 0x2000;
 /// # Errors
 /// [`LoadError`] if there is no such mesh, or the file is cut short, corrupt, of another version than 3 and
 /// 4, or too large.
-pub(crate) fn parse(bytes: &[u8], index: usize, path: &Path) -> Result<(Triangles, bool), LoadError> {
+pub(crate) fn parse(
+    folder: &Folder,
+    bytes: &[u8],
+    index: usize,
+    path: &Path,
+) -> Result<(Triangles, bool), LoadError> {
     let place = Place::part(path, format_args!("mesh {index}"));
     let bad = |what: &str| place.clone().bad(what);
     let version = version(bytes, &place)?;
@@ -51,7 +57,7 @@ pub(crate) fn parse(bytes: &[u8], index: usize, path: &Path) -> Result<(Triangle
     let version = self::version(mesh, &place)?;
     let stream = &mesh[4..];
     let limit = (stream.len() as u64).saturating_mul(RATIO).min(MAX_BYTES);
-    Inflated { stream: ZlibDecoder::new(stream), left: limit, place: &place }.mesh(version)
+    Inflated { stream: ZlibDecoder::new(stream), left: limit, folder, place: &place }.mesh(version)
 }
 
 /// Checks the first four bytes of a file or mesh.
@@ -75,6 +81,8 @@ struct Inflated<'a> {
     stream: ZlibDecoder<&'a [u8]>,
     /// Bytes that may still come.
     left: u64,
+    /// Counts those of all meshes.
+    folder: &'a Folder,
     place: &'a Place,
 }
 
@@ -141,6 +149,7 @@ impl Inflated<'_> {
                 "the mesh says it has {count} bytes more, which the file cannot hold or are too many"
             ))
         })?;
+        self.folder.inflate(count, self.place)?;
         // Grows with what comes, whatever the counts say
         let mut bytes = Vec::new();
         self.stream
@@ -208,7 +217,8 @@ mod tests {
     }
 
     fn read(bytes: &[u8], index: usize) -> Result<(Triangles, bool), String> {
-        parse(bytes, index, Path::new("a.serialized")).map_err(|e| e.to_string())
+        let folder = Folder::of(Path::new("a.xml"), None, String::new());
+        parse(&folder, bytes, index, Path::new("a.serialized")).map_err(|e| e.to_string())
     }
 
     #[test]

@@ -241,7 +241,7 @@ impl<'d> Context<'d> {
                 let index = self.integer(element, "shape_index")?.unwrap_or(0);
                 let index =
                     usize::try_from(index).map_err(|_| self.bad(element, "`shape_index` is negative"))?;
-                serialized::parse(&bytes, index, &path)?
+                serialized::parse(&self.document.folder, &bytes, index, &path)?
             }
         };
         mesh.check(&Place::file(&path))?;

@@ -10,11 +10,12 @@ pub(super) struct Arguments<'a, 't> {
     tokens: &'a mut Tokens<'t>,
     path: &'a Path,
     line: u32,
+    directive: &'a str,
 }
 
 impl<'a, 't> Arguments<'a, 't> {
-    pub(super) fn new(tokens: &'a mut Tokens<'t>, path: &'a Path, line: u32) -> Self {
-        Self { tokens, path, line }
+    pub(super) fn new(tokens: &'a mut Tokens<'t>, path: &'a Path, line: u32, directive: &'a str) -> Self {
+        Self { tokens, path, line, directive }
     }
 
     pub(super) fn place(&self) -> Place {
@@ -23,7 +24,8 @@ impl<'a, 't> Arguments<'a, 't> {
 
     /// A name in quotes.
     pub(super) fn text(&mut self) -> Result<String, LoadError> {
-        self.skip()?.ok_or_else(|| self.place().bad("expected a directive with a name in quotes"))
+        let found = self.skip()?;
+        found.ok_or_else(|| self.place().bad(format!("{} needs a name in quotes", self.directive)))
     }
 
     /// The next token, if it is a text in quotes, or nothing.
@@ -48,6 +50,22 @@ impl<'a, 't> Arguments<'a, 't> {
     /// Passes over one token.
     pub(super) fn pass(&mut self) -> Result<(), LoadError> {
         self.skip().map(drop)
+    }
+
+    /// Passes over all up to the next directive, of which nothing is known but that it begins with a capital.
+    pub(super) fn pass_all(&mut self) -> Result<(), LoadError> {
+        let path = self.path;
+        let mut depth = 0u64;
+        while let Some(token) = self.tokens.peek().map_err(|line| unended(path, line))? {
+            match &token.kind {
+                Kind::Word(word) if depth == 0 && word.starts_with(|c: char| c.is_ascii_uppercase()) => break,
+                Kind::Open => depth += 1,
+                Kind::Close => depth = depth.saturating_sub(1),
+                Kind::Word(_) | Kind::Text(_) => {}
+            }
+            self.tokens.next().map_err(|line| unended(path, line))?;
+        }
+        Ok(())
     }
 
     /// Passes over an option: a declaration or a name in quotes, and its values. Returns its name.

@@ -34,7 +34,10 @@ impl Reader<'_> {
             Some([r, g, b]) => [*r as f32, *g as f32, *b as f32],
             Some(_) => return Err(params.bad("`scale` has neither one number nor three")),
         };
-        let Some(param) = params.get(name) else { return Ok(scale) };
+        let Some(param) = params.get(name) else {
+            let white = params.space.to_rec709([1.0; 3], Quantity::Light);
+            return Ok(std::array::from_fn(|i| white[i] * scale[i]));
+        };
         let normalised = |colour: Rgb| {
             let level = luminance(colour);
             if level > 0.0 { colour.map(|c| c / level) } else { colour }
@@ -84,7 +87,10 @@ impl Reader<'_> {
         match (param.kind.as_str(), numbers) {
             (_, [grey]) => Ok([*grey as f32; 3]),
             ("xyz", [x, y, z]) => Ok(colour::of_xyz([*x, *y, *z])),
-            ("rgb" | "color", [r, g, b]) => Ok([*r as f32, *g as f32, *b as f32]),
+            ("rgb" | "color", [r, g, b]) => {
+                let own = [*r as f32, *g as f32, *b as f32];
+                Ok(param.space.to_rec709(own, quantity))
+            }
             ("spectrum", pairs) if pairs.len() % 2 == 0 => {
                 let samples: Vec<_> = pairs.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect();
                 self.spectrum(params, samples, quantity)

@@ -4,6 +4,7 @@ use super::arguments::Arguments;
 use super::params::Params;
 use super::reader::{MAX_DEPTH, Reader};
 use super::state::{Definition, Look, Object};
+use crate::colour::ColourSpace;
 use crate::error::{LoadError, Place};
 use glam::DMat4;
 use std::rc::Rc;
@@ -22,6 +23,27 @@ const NO_OPTION_OF_PICTURES: [&str; 12] = [
     "rendercoordsys",
     "seed",
     "wavefront",
+];
+
+/// Directives of a kind in quotes and parameters.
+const WITH_PARAMS: [&str; 17] = [
+    "Accelerator",
+    "AreaLightSource",
+    "Attribute",
+    "Camera",
+    "ColorSpace",
+    "Film",
+    "Integrator",
+    "LightSource",
+    "MakeNamedMaterial",
+    "MakeNamedMedium",
+    "Material",
+    "PixelFilter",
+    "Renderer",
+    "Sampler",
+    "Shape",
+    "SurfaceIntegrator",
+    "VolumeIntegrator",
 ];
 
 impl Reader<'_> {
@@ -64,16 +86,22 @@ impl Reader<'_> {
             "MediumInterface" => self.state.in_medium = args.texts()?.iter().any(|name| !name.is_empty()),
             "Texture" => {
                 let (name, values, class) = (args.text()?, args.text()?, args.text()?);
-                let params = args.params()?;
+                let params = args.params()?.in_space(self.state.colour_space);
                 let result = self.texture(&name, &values, &class, &params);
                 self.errors.take(result)?;
                 self.say_unused(&params, &format!("{word} \"{class}\""));
             }
-            _ => {
+            _ if WITH_PARAMS.contains(&word) => {
                 let kind = args.text()?;
-                let params = args.params()?;
+                let params = args.params()?.in_space(self.state.colour_space);
                 let result = self.with_params(word, &kind, params);
                 self.errors.take(result)?;
+            }
+            // Of a fork of pbrt, or a slip: pbrt refuses it, too
+            _ => {
+                let unknown = args.place().bad(format!("the directive {word} is not known"));
+                self.errors.take::<()>(Err(unknown))?;
+                args.pass_all()?;
             }
         }
         Ok(())
@@ -140,7 +168,7 @@ impl Reader<'_> {
                 if kind != "diffuse" && kind != "area" {
                     return Err(params.place.clone().unsupported(called));
                 }
-                self.state.area_light = Some(Rc::new(params));
+                self.state.area_light = self.area_light(&params)?.map(Rc::new);
             }
             "Attribute" => {
                 let all = self.with_defaults(kind, params)?;
@@ -152,7 +180,8 @@ impl Reader<'_> {
                 }
                 self.ignored(&params.place, "the participating medium is ignored");
             }
-            _ => self.ignored(&params.place, format!("the directive {word} is ignored")),
+            // None other is asked for
+            _ => {}
         }
         Ok(())
     }
@@ -187,19 +216,19 @@ impl Reader<'_> {
                 params.ignore(&["lightsampler", "lightsamplestrategy", "strategy", "rrthreshold"]);
                 self.say_unused(params, called);
             }
-            "ColorSpace" if kind != "srgb" => {
-                let what = format!("the colour space `{kind}` is ignored: colours are taken for sRGB's");
-                self.ignored(&params.place, what);
+            "ColorSpace" => {
+                let unknown = || params.place.clone().unsupported(format!("the colour space `{kind}`"));
+                self.state.colour_space = ColourSpace::named(kind).ok_or_else(unknown)?;
             }
             // Noise, speed, and the filter of the picture, which is the caller's
-            "Sampler" | "PixelFilter" | "Accelerator" | "ColorSpace" | "SurfaceIntegrator" | "Renderer"
+            "Sampler" | "PixelFilter" | "Accelerator" | "SurfaceIntegrator" | "Renderer"
             | "VolumeIntegrator" => {}
             _ => return Ok(false),
         }
         Ok(true)
     }
 
-    /// Parameters with those that `Attribute` gave for all things of a kind, but for colour spaces.
+    /// Parameters with those that `Attribute` gave for all things of a kind.
     fn with_defaults(&self, kind: &str, params: Params) -> Result<Params, LoadError> {
         let Some(defaults) = self.state.defaults.get(kind) else { return Ok(params) };
         // Each is copied, and compared with each

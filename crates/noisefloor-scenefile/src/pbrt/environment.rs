@@ -49,6 +49,13 @@ fn to_square(dir: DVec3) -> [f64; 2] {
     [u.copysign(dir.x), v.copysign(dir.y)].map(|x| 0.5 * (x + 1.0))
 }
 
+/// How far a point of the unit square lies above the horizon: the z of its direction.
+pub(super) fn height([u, v]: [f64; 2]) -> f64 {
+    let inside = 1.0 - (2.0 * u - 1.0).abs() - (2.0 * v - 1.0).abs();
+    let radius = 1.0 - inside.abs();
+    (1.0 - radius * radius).copysign(inside)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,6 +72,7 @@ mod tests {
             (DVec3::NEG_Z, [1.0, 1.0]),
         ] {
             let got = to_square(dir);
+            assert!((height(got) - dir.z).abs() < 1e-9, "{dir}");
             assert!((got[0] - want[0]).abs() < 1e-9 && (got[1] - want[1]).abs() < 1e-9, "{dir} {got:?}");
         }
     }
@@ -79,6 +87,7 @@ mod tests {
             let (y, x) = (f64::from(i) * 2.399_963).sin_cos();
             let r = (1.0 - z * z).sqrt();
             let [u, v] = to_square(DVec3::new(r * x, r * y, z));
+            assert!((height([u, v]) - z).abs() < 1e-9);
             counts[(v * 4.0).min(3.0) as usize * 4 + (u * 4.0).min(3.0) as usize] += 1;
         }
         assert!(counts.iter().all(|c| (c - n / 16).abs() < n / 160), "{counts:?}");

@@ -59,8 +59,11 @@ impl Reader<'_> {
         Ok(id)
     }
 
-    /// Whether the material of the shapes that come may have a texture.
+    /// Whether the material or the light of the shapes that come may have a texture.
     pub(super) fn is_textured(&self) -> bool {
+        if self.state.area_light.as_ref().is_some_and(|light| light.emission.texture.is_some()) {
+            return true;
+        }
         let definition = match &self.state.material {
             Look::Given(definition) => Some(definition),
             Look::Named(name, _) => self.named_materials.get(name),

@@ -1,6 +1,7 @@
 //! Parameters of a directive: `"float fov" [40]`.
 
 use super::tokens::{Kind, Tokens};
+use crate::colour::ColourSpace;
 use crate::error::{LoadError, Place};
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -22,6 +23,8 @@ pub(super) struct Param {
     pub(super) kind: String,
     pub(super) name: String,
     pub(super) values: Rc<Values>,
+    /// Of its numbers, if they are a colour.
+    pub(super) space: ColourSpace,
     used: Cell<bool>,
 }
 
@@ -29,6 +32,8 @@ pub(super) struct Param {
 #[derive(Clone, Debug)]
 pub(super) struct Params {
     pub(super) place: Place,
+    /// Of colours that none of them gives.
+    pub(super) space: ColourSpace,
     all: Vec<Param>,
 }
 
@@ -47,9 +52,10 @@ pub(super) fn read(tokens: &mut Tokens<'_>, path: &Path, line: u32) -> Result<Pa
         let (kind, name) = (kind.to_owned(), name.to_owned());
         tokens.next().map_err(open)?;
         let values = values(tokens, path, &here, &name)?;
-        all.push(Param { kind, name, values: Rc::new(values), used: Cell::new(false) });
+        let space = ColourSpace::default();
+        all.push(Param { kind, name, values: Rc::new(values), space, used: Cell::new(false) });
     }
-    Ok(Params { place, all })
+    Ok(Params { place, space: ColourSpace::default(), all })
 }
 
 /// One value, or some in brackets.
@@ -119,7 +125,14 @@ impl Params {
 
     /// No parameters.
     pub(super) fn none(place: Place) -> Self {
-        Self { place, all: vec![] }
+        Self { place, space: ColourSpace::default(), all: vec![] }
+    }
+
+    /// Says of which space the colours are.
+    pub(super) fn in_space(mut self, space: ColourSpace) -> Self {
+        self.space = space;
+        self.all.iter_mut().for_each(|param| param.space = space);
+        self
     }
 
     /// Adds those of `more` that are not there yet.

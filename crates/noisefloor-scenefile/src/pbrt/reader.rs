@@ -21,11 +21,13 @@ use std::rc::Rc;
 
 /// How deep files may include each other, and transforms nest.
 pub(super) const MAX_DEPTH: u32 = 64;
-/// Most bytes of all files of directives.
-const MAX_BYTES: u64 = 1 << 29;
-/// Most files of directives, where those that are included more than once count as often: a sponge of
-/// instances has 160,000. Empty ones count no bytes, and files that include others twice would have 2⁶⁴.
+/// Most bytes of all files of directives, and most files, where those that are included more than once count as
+/// often: a sponge of instances (shadeops/pbrt-v4-menger) has 160,000 files of 3.5 kB. Empty ones count no bytes, and
+/// files that include others twice would have 2⁶⁴.
+const MAX_BYTES: u64 = 1 << 30;
 const MAX_FILES: u64 = 1 << 18;
+/// Longest file of directives that is kept, in bytes: what is included often is short.
+const KEPT: usize = 1 << 16;
 /// Most triangles that are made: by subdivision, of round shapes, and of lamps in instances. A short file can ask
 /// for any number.
 const MAX_MADE: u64 = 1 << 23;
@@ -68,6 +70,8 @@ pub(super) struct Reader<'a> {
     pub(super) version_3: bool,
     bytes: u64,
     files: u64,
+    /// Short files of directives, by their paths.
+    texts: HashMap<PathBuf, Rc<str>>,
     pub(super) errors: Errors,
     warnings: Vec<Warning>,
     said: HashSet<(Option<String>, String)>,
@@ -103,6 +107,7 @@ impl<'a> Reader<'a> {
             version_3: false,
             bytes: 0,
             files: 0,
+            texts: HashMap::new(),
             errors: Errors::default(),
             warnings: vec![],
             said: HashSet::new(),
@@ -115,18 +120,30 @@ impl<'a> Reader<'a> {
         place.clone().at_most("levels of included files", u64::from(depth), u64::from(MAX_DEPTH))?;
         self.files += 1;
         place.clone().at_most("files of directives", self.files, MAX_FILES)?;
-        let bytes = self.bytes_of(path, MAX_BYTES - self.bytes, &place)?;
-        self.bytes += bytes.len() as u64;
-        let text = files::text(&bytes);
+        let text = match self.texts.get(path) {
+            Some(text) => text.clone(),
+            None => {
+                let bytes = self.bytes_of(path, MAX_FILE_BYTES, &place)?;
+                let text: Rc<str> = files::text(&bytes).into();
+                if text.len() <= KEPT {
+                    self.texts.insert(path.to_owned(), text.clone());
+                }
+                text
+            }
+        };
+        self.bytes += text.len() as u64;
+        let what = "bytes of directives so far (a file that is included again counts again)";
+        place.at_most(what, self.bytes, MAX_BYTES)?;
         self.version_3 |= depth == 0 && has_world_end(&text);
         let mut tokens = Tokens::new(&text);
         loop {
             let open = |line: u32| at(path, line).bad("a quote does not end");
             let Some(token) = tokens.next().map_err(open)? else { return Ok(()) };
-            let Kind::Word(word) = token.kind else {
-                return Err(at(path, token.line).bad("expected a directive such as Shape"));
+            let word = match token.kind {
+                Kind::Word(word) if word.starts_with(|c: char| c.is_ascii_alphabetic()) => word,
+                _ => return Err(at(path, token.line).bad("expected a directive such as Shape")),
             };
-            self.directive(&word, &mut Arguments::new(&mut tokens, path, token.line), depth)?;
+            self.directive(&word, &mut Arguments::new(&mut tokens, path, token.line, &word), depth)?;
         }
     }
 
@@ -137,11 +154,14 @@ impl<'a> Reader<'a> {
             return Ok(bytes);
         }
         // DEFLATE makes at most 1032 bytes of one; twice, since a buffer that grows is copied
-        has_memory(limit.min(1032 * bytes.len() as u64), 2, place)?;
+        let most = limit.min(self.folder.left());
+        has_memory(most.min(1032 * bytes.len() as u64), 2, place)?;
         let mut inflated = Vec::new();
-        let read = GzDecoder::new(bytes.as_slice()).take(limit + 1).read_to_end(&mut inflated);
+        let read = GzDecoder::new(bytes.as_slice()).take(most + 1).read_to_end(&mut inflated);
         read.map_err(|e| Place::file(path).bad(format!("the file cannot be inflated: {e}")))?;
-        Place::file(path).at_most("bytes, inflated", inflated.len() as u64, limit)?;
+        let length = inflated.len() as u64;
+        Place::file(path).at_most("bytes, inflated", length, limit)?;
+        self.folder.inflate(length, &Place::file(path))?;
         Ok(inflated)
     }
 

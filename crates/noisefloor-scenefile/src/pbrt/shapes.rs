@@ -7,8 +7,9 @@ use super::state::{Form, Part, Wear};
 use crate::error::{LoadError, Place};
 use crate::files::{MAX_FILE_BYTES, has_memory};
 use crate::mesh::{Triangles, ply, solids, subdivide};
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use noisefloor_ptwne::Texture;
+use std::f64::consts::PI;
 
 /// Most triangles that subdivision makes of a mesh, beside three levels of it, which are usual: a short file can
 /// ask for any number.
@@ -28,25 +29,21 @@ impl Reader<'_> {
         }
         self.bounds.spend(params.numbers_in_all(), &params.place)?;
         let alpha = self.alpha(params)?;
-        let emission = self.emission()?;
-        let material = self.current_material(alpha, emission.is_some(), &params.place)?;
-        let wear = Wear { material, emission };
+        let light = self.state.area_light.clone();
+        let material = self.current_material(alpha, light.is_some(), &params.place)?;
         // Whole, and its light from its outside. Whether instances stretch it is seen when they come
         let in_object = self.open_object.is_some();
-        let shines = wear.emission.as_ref().is_some_and(|emission| !emission.two_sided);
+        let shines = light.as_ref().is_some_and(|light| !light.emission.two_sided);
+        let pictured = light.as_ref().is_some_and(|light| light.emission.texture.is_some());
         let turned = self.state.reversed && (shines || in_object);
         let partial = ["zmin", "zmax", "phimax"].iter().any(|name| params.get(name).is_some());
         let place = params.place.clone();
         let (to_world, radius) = (self.state.to_world, positive(params, "radius", 1.0));
-        let round = kind == "sphere" && !turned && !partial;
+        let round = kind == "sphere" && !turned && !partial && !pictured;
         let form = if round && (in_object || ball(to_world, 1.0).is_some()) {
             Form::Ball(to_world, radius?)
-        } else if round && !self.state.reversed && wear.emission.is_none() {
-            return self.ellipsoid(
-                to_world * DMat4::from_scale(DVec3::splat(radius?)),
-                wear.material,
-                &place,
-            );
+        } else if round && !self.state.reversed && light.is_none() {
+            return self.ellipsoid(to_world * DMat4::from_scale(DVec3::splat(radius?)), material, &place);
         } else {
             let mesh = self.mesh(kind, params)?;
             if mesh.indices.is_empty() {
@@ -54,6 +51,17 @@ impl Reader<'_> {
             }
             Form::Mesh(mesh)
         };
+        let emission = match light {
+            Some(light) => {
+                if light.power.is_some() && parts_of(kind, &form) > 1 {
+                    let what = "`power` is that of all faces of a mesh together, where pbrt gives it to each";
+                    self.approximated(&place, what);
+                }
+                Some(light.of_area(area(&form), &place)?)
+            }
+            None => None,
+        };
+        let wear = Wear { material, emission };
         let part = Part { form, wear, place };
         match &mut self.open_object {
             Some((_, parts)) => {
@@ -202,6 +210,26 @@ impl Reader<'_> {
             }
         }
         Ok(mesh)
+    }
+}
+
+/// How many shapes a shape is to pbrt, each of which is a light of its own.
+fn parts_of(kind: &str, form: &Form) -> usize {
+    match (kind, form) {
+        ("trianglemesh" | "plymesh" | "loopsubdiv", Form::Mesh(mesh)) => mesh.indices.len(),
+        ("bilinearmesh", Form::Mesh(mesh)) => mesh.indices.len() / 2,
+        _ => 1,
+    }
+}
+
+/// The area of a shape where it is.
+fn area(form: &Form) -> f64 {
+    match form {
+        Form::Mesh(mesh) => mesh.area(),
+        Form::Ball(to_world, radius) => {
+            let scale = DMat3::from_mat4(*to_world).determinant().abs().cbrt();
+            4.0 * PI * (scale * radius).powi(2)
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! The state that directives change, and what they define.
 
 use super::params::Params;
-use crate::error::Place;
+use crate::colour::ColourSpace;
+use crate::error::{LoadError, Place};
 use crate::mesh::Triangles;
 use glam::DMat4;
 use noisefloor::Rgb;
@@ -15,8 +16,10 @@ pub(super) struct State {
     /// From the coordinates of what comes next to the world.
     pub(super) to_world: DMat4,
     pub(super) material: Look,
-    pub(super) area_light: Option<Rc<Params>>,
+    pub(super) area_light: Option<Rc<AreaLight>>,
     pub(super) reversed: bool,
+    /// Of the colours that come.
+    pub(super) colour_space: ColourSpace,
     /// Whether a medium is on either side of the surfaces that come.
     pub(super) in_medium: bool,
     /// Parameters that `Attribute` adds to all that come: by what they are for.
@@ -32,6 +35,26 @@ pub(super) struct State {
 pub(super) struct Height {
     pub(super) map: ImageTexture,
     pub(super) scale: f32,
+}
+
+/// What an `AreaLightSource` says of the shapes that come.
+#[derive(Clone, Debug)]
+pub(super) struct AreaLight {
+    pub(super) emission: Emission,
+    /// What the radiance is to be multiplied with, times the area of the shape, if it is to have a power.
+    pub(super) power: Option<f64>,
+}
+
+impl AreaLight {
+    /// The emission of a shape of that area.
+    pub(super) fn of_area(&self, area: f64, place: &Place) -> Result<Emission, LoadError> {
+        let Some(power) = self.power else { return Ok(self.emission.clone()) };
+        let radiance = self.emission.radiance.map(|c| (f64::from(c) * power / area) as f32);
+        if !radiance.iter().all(|c| c.is_finite()) {
+            return Err(place.clone().bad("`power` needs a shape that has an area"));
+        }
+        Ok(Emission { radiance, ..self.emission.clone() })
+    }
 }
 
 /// A material, by its name or as it was given.
@@ -96,6 +119,7 @@ impl State {
             material: Look::Given(Rc::new(diffuse)),
             area_light: None,
             reversed: false,
+            colour_space: ColourSpace::default(),
             in_medium: false,
             defaults: HashMap::new(),
             float_textures: Rc::default(),

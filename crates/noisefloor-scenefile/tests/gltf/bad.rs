@@ -325,3 +325,19 @@ fn glb_files_that_are_cut_short_say_so() {
     let error = load("a.glb", &version).unwrap_err().to_string();
     assert!(error.contains("version 1 of GLB is not supported"), "{error}");
 }
+
+/// Files of version 1 have objects where version 2 has lists, and need not say their version.
+#[test]
+fn version_1_is_named_before_its_lists() {
+    for (asset, want) in [
+        (r#""asset": {"version": "1.0"},"#, "version \"1.0\" of glTF is not supported"),
+        (r#""asset": {"version": 1},"#, "version 1 of glTF is not supported"),
+        (r#""asset": {"generator": "x"},"#, "version 1 of glTF"),
+        ("", "version 1 of glTF"),
+    ] {
+        let file =
+            format!(r#"{{{asset} "accessors": {{"a": {{}}}}, "meshes": {{"m": {{"primitives": []}}}}}}"#);
+        let error = load("a.gltf", file.as_bytes()).unwrap_err().to_string();
+        assert!(error.contains(want), "{error}, not {want}");
+    }
+}

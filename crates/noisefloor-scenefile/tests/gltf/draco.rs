@@ -207,7 +207,6 @@ fn bad_data_is_named() {
         (set(&format!("{extension}/attributes"), r#"{"NORMAL": -1}"#), "it needs a number per attribute"),
         (set(&format!("{extension}/bufferView"), "null"), "it needs a bufferView"),
         (set(&format!("{extension}/bufferView"), "77"), "buffer view 77 does not exist"),
-        (set("/meshes/0/primitives/0/indices", "null"), "the primitive has no indices"),
         (compressed(&cut), "its Draco data cannot be decoded"),
         (compressed(b"glTF"), "its Draco data cannot be decoded"),
         (compressed(&later), "version 9.2 of Draco data is not supported"),
@@ -238,4 +237,15 @@ fn damaged_data_never_panics() {
         }
     }
     assert!(loaded > 50 && refused > 50, "{loaded} {refused}");
+}
+
+/// Without an accessor of indices, the faces are those of the data.
+#[test]
+fn indices_need_no_accessor() {
+    for data in [VALENCE, STANDARD, SEQUENTIAL] {
+        let mut maker = compressed(&bytes(data));
+        let with = render(maker.load().unwrap(), 16, 4, 1);
+        maker.root["meshes"][0]["primitives"][0].as_object_mut().unwrap().remove("indices");
+        assert_eq!(render(maker.load().unwrap(), 16, 4, 1), with);
+    }
 }

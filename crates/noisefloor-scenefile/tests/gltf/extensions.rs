@@ -1,6 +1,6 @@
 //! Extensions, normal maps and colours of vertices, in closed form; and daylight.
 
-use crate::kit::{Maker, json, render};
+use crate::kit::{Maker, assert_warns, json, render};
 use crate::materials::{assert_close, linear, mean, near, wall};
 
 /// A distant light along −z: what a wall of normal n reflects of it is Lambert's cosine.
@@ -267,4 +267,78 @@ fn webp_pictures_are_read() {
         assert_close(mean(&maker, 4, 1), [188, 10, 250].map(linear), 1e-5);
         assert_eq!(maker.load().unwrap().warnings, []);
     }
+}
+
+/// A lossless WebP of one colour: as many bytes whatever its size. The codes of its five channels have no bits.
+fn plain_webp(width: u32, height: u32) -> Vec<u8> {
+    let mut bits: u128 = u128::from(width - 1) | u128::from(height - 1) << 14;
+    // No alpha, version 0, no transform, no cache, no groups; five codes of the one symbol 1
+    for code in 0..5 {
+        bits |= 0b1001 << (14 + 14 + 1 + 3 + 3 + 4 * code);
+    }
+    let mut chunk = vec![0x2f];
+    chunk.extend(&bits.to_le_bytes()[..9]);
+    let mut file = b"RIFF".to_vec();
+    file.extend((4 + 8 + chunk.len() as u32).to_le_bytes());
+    file.extend(b"WEBPVP8L");
+    file.extend((chunk.len() as u32).to_le_bytes());
+    file.extend(chunk);
+    file
+}
+
+/// A few bytes stand for a picture of one colour of some size, but not of any, and not any number of times.
+#[test]
+fn plain_pictures_have_limits() {
+    let textured = |size: u32, images: usize| {
+        let mut maker = Maker::new();
+        let view = maker.view(&plain_webp(size, size), "");
+        for index in 0..images {
+            maker.push("images", &format!(r#"{{"bufferView": {view}, "mimeType": "image/webp"}}"#));
+            maker.push("textures", &format!(r#"{{"source": {index}}}"#));
+            let material =
+                format!(r#"{{"emissiveFactor": [1, 1, 1], "emissiveTexture": {{"index": {index}}}}}"#);
+            let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, &material);
+            maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+        }
+        maker.load()
+    };
+    // The code 1 of 255
+    let seen = render(textured(64, 1).unwrap(), 4, 1, 1)[5][1];
+    assert!((seen - 1.0 / 255.0 / 12.92).abs() < 1e-6, "{seen}");
+    let error = textured(8192, 1).unwrap_err().to_string();
+    assert!(error.contains("bytes cannot hold 8192×8192 pixels"), "{error}");
+    let error = textured(2048, 40).unwrap_err().to_string();
+    assert!(error.contains("pixels of pictures so far, more than"), "{error}");
+}
+
+/// A texture whose image was lost is white, and a normal map without one is left out; of two images, the one that is
+/// there is shown.
+#[test]
+fn textures_without_images_are_left_out() {
+    let mut maker = Maker::new();
+    maker.push("textures", "{}");
+    let material =
+        r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}, "normalTexture": {"index": 0}}"#;
+    let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
+    maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    let loaded = maker.load().unwrap();
+    assert_warns(&loaded, &["texture 0: ", "it names no image: it is white"]);
+    assert_warns(&loaded, &["material 0: ", "its normal map names no image: it is left out"]);
+    assert_eq!(render(loaded, 4, 1, 1)[5], [1.0; 3]);
+
+    // A PNG that is absent beside a WebP that is there, and the other way round
+    let view = maker.view(&plain_webp(4, 4), "");
+    let webp = maker.push("images", &format!(r#"{{"bufferView": {view}, "mimeType": "image/webp"}}"#));
+    let absent = maker.push("images", r#"{"uri": "absent.png"}"#);
+    for (own, other) in [(absent, webp), (webp, absent)] {
+        maker.root["textures"][0] = json(&format!(
+            r#"{{"source": {own}, "extensions": {{"EXT_texture_webp": {{"source": {other}}}}}}}"#
+        ));
+        maker.root["materials"][0].as_object_mut().unwrap().remove("normalTexture");
+        let seen = render(maker.load().unwrap(), 4, 1, 1)[5][1];
+        assert!((seen - 1.0 / 255.0 / 12.92).abs() < 1e-6, "{seen}");
+    }
+    maker.root["textures"][0] = json(&format!(r#"{{"source": {absent}}}"#));
+    let error = maker.load().unwrap_err();
+    assert!(format!("{error:?}").contains("absent.png"), "{error:?}");
 }

@@ -102,3 +102,31 @@ fn bad_views_are_named() {
         );
     }
 }
+
+/// Any number of views can name the same data, which stands for 64 times as much: what all become together is in
+/// proportion to the file.
+#[test]
+fn views_of_the_same_data_count_together() {
+    // Blocks of 256 elements of 32 bytes that are all alike
+    let blocks = 800;
+    let data = [&[0xa0][..], &vec![0; 128 * blocks + 32]].concat();
+    let count = 256 * blocks;
+    let bomb = |views: usize| {
+        let mut maker = square();
+        let view = maker.view(&data, "");
+        let start = maker.root["bufferViews"][view]["byteOffset"].clone();
+        for _ in 0..views {
+            let extension = format!(
+                r#"{{"EXT_meshopt_compression": {{"buffer": 0, "byteOffset": {start}, "byteLength": {},
+                    "byteStride": 32, "count": {count}, "mode": "ATTRIBUTES"}}}}"#,
+                data.len()
+            );
+            let view = format!(r#"{{"buffer": 0, "byteLength": {}, "extensions": {extension}}}"#, 32 * count);
+            maker.push("bufferViews", &view);
+        }
+        maker.load()
+    };
+    bomb(2).unwrap();
+    let error = bomb(100).unwrap_err().to_string();
+    assert!(error.contains("inflated bytes so far, more than"), "{error}");
+}

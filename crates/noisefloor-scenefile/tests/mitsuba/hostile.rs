@@ -131,3 +131,28 @@ fn changed_bytes_never_panic() {
     // Most changes matter
     assert!(broken > 400, "{broken}");
 }
+
+/// Any number of shapes can name one mesh that inflates a thousandfold: all together are in proportion to the files.
+#[test]
+fn inflated_meshes_count_together() {
+    use std::io::Write;
+    let vertices = 1 << 19;
+    let mut inside = 0x1000u32.to_le_bytes().to_vec();
+    inside.extend(b"\0");
+    inside.extend([vertices as u64, 1].map(u64::to_le_bytes).concat());
+    inside.extend(vec![0; 12 * vertices]);
+    inside.extend([0u32, 1, 2].map(u32::to_le_bytes).concat());
+    let mut encoder = flate2::write::ZlibEncoder::new(vec![0x1c, 0x04, 4, 0], flate2::Compression::default());
+    encoder.write_all(&inside).unwrap();
+    let mut bytes = encoder.finish().unwrap();
+    bytes.extend(0u64.to_le_bytes());
+    bytes.extend(1u32.to_le_bytes());
+    assert!(bytes.len() < 10_000);
+    let shape = r#"<shape type="serialized"><string name="filename" value="mesh.serialized"/></shape>"#;
+    let scene = |shapes: usize| {
+        format!(r#"<scene version="3.0.0"><sensor type="perspective"/>{}</scene>"#, shape.repeat(shapes))
+    };
+    let folder = Folder::new().with("mesh.serialized", bytes).with("scene.xml", scene(40));
+    let error = load(&folder.path().join("scene.xml")).unwrap_err().to_string();
+    assert!(error.contains("inflated bytes so far, more than"), "{error}");
+}

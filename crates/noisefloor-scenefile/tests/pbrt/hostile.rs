@@ -108,3 +108,21 @@ fn what_is_too_large_is_an_error() {
     let includes = folder.world("Include \"0.pbrt\"").unwrap_err();
     assert!(includes.contains("262145 files of directives, more than 262144"), "{includes}");
 }
+
+/// Any number of shapes can name one gzipped mesh: what all become together is in proportion to the files.
+#[test]
+fn inflated_files_count_together() {
+    use std::io::Write;
+    let mut ply = b"ply\nformat ascii 1.0\n".to_vec();
+    ply.extend(b"element vertex 3\nproperty float x\nproperty float y\nproperty float z\n");
+    ply.extend(b"element face 1\nproperty list uchar int vertex_indices\nend_header\n");
+    ply.extend(b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2");
+    ply.extend(vec![b' '; 6 << 20]);
+    let mut encoder = flate2::write::GzEncoder::new(vec![], flate2::Compression::default());
+    encoder.write_all(&ply).unwrap();
+    let folder = Folder::new().with("a.ply.gz", encoder.finish().unwrap());
+    let shape = "Shape \"plymesh\" \"string filename\" \"a.ply.gz\"\n";
+    folder.world(shape).unwrap();
+    let error = folder.world(&shape.repeat(40)).unwrap_err();
+    assert!(error.contains("inflated bytes so far, more than"), "{error}");
+}

@@ -2,6 +2,7 @@ use crate::util::{CAMERA, Folder, close, look};
 use noisefloor::{ProgressiveSource, Request, Tile};
 use noisefloor_ptwne::{FovAxis, Ptwne, RenderOptions};
 use noisefloor_scenefile::LoadOptions;
+use std::f32::consts::PI;
 
 /// A square from −1 to 1 whose front is +z.
 const SQUARE: &str =
@@ -492,4 +493,114 @@ fn files_are_read_in_any_text_or_named() {
         let error = folder.world(world).unwrap_err();
         assert!(error.contains(want), "{world}: {error}");
     }
+}
+
+/// What [`SQUARE`] is of, with an albedo of ½.
+const GREY: &str = "Material \"diffuse\" \"rgb reflectance\" [.5 .5 .5]\n";
+
+/// The formulas of pbrt-v4's lights.cpp (k_e and E_v of each `Create`): light of luminance 1 times what is asked for.
+#[test]
+fn lights_have_the_power_that_is_asked_for() {
+    let folder = Folder::new();
+    let diffuse = |irradiance: f32| 0.5 / PI * irradiance;
+    let cone = 2.0
+        * PI
+        * ((1.0 - 25f32.to_radians().cos()) + (25f32.to_radians().cos() - 30f32.to_radians().cos()) / 2.0);
+    for (light, want) in [
+        (
+            "LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float illuminance\" 2",
+            diffuse(2.0),
+        ),
+        (
+            "LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float illuminance\" 2 \"float scale\" 3",
+            diffuse(6.0),
+        ),
+        (
+            "LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float illuminance\" -1",
+            diffuse(1.0),
+        ),
+        ("LightSource \"point\" \"point3 from\" [0 0 1] \"float power\" 100", diffuse(100.0 / (4.0 * PI))),
+        (
+            "LightSource \"spot\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float power\" 100",
+            diffuse(100.0 / cone),
+        ),
+        ("LightSource \"infinite\" \"float illuminance\" 3", 0.5 / PI * 3.0),
+    ] {
+        let got = folder.see(&format!("{light}\n{GREY}{SQUARE}"));
+        close(got, [want; 3], 0.02, light);
+    }
+    // Version 3 knows neither
+    let old = "LightSource \"point\" \"point3 from\" [0 0 1] \"float power\" 100\n";
+    close(folder.see(&format!("{old}{GREY}{SQUARE}WorldEnd")), [diffuse(1.0); 3], 0.02, "version 3");
+
+    // Shapes that shine: π times area times radiance
+    let patch = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]";
+    for (shape, sides, area) in [
+        (SQUARE, 1.0, 4.0),
+        (SQUARE, 2.0, 4.0),
+        (patch, 1.0, 4.0),
+        ("Scale 2 2 2 Shape \"disk\" \"float radius\" 1", 1.0, 4.0 * PI),
+        ("Shape \"sphere\" \"float radius\" 2", 1.0, 16.0 * PI),
+        ("Scale 2 2 2 Shape \"sphere\"", 1.0, 16.0 * PI),
+    ] {
+        let light =
+            format!("AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" {}\n", sides > 1.0);
+        let loaded = folder.world(&format!("{light}{shape}")).unwrap();
+        let said = loaded.warnings.iter().any(|w| w.what.contains("where pbrt gives it to each"));
+        assert_eq!(said, shape == SQUARE, "{shape}: {:?}", loaded.warnings);
+        close(look(loaded, 1)[0], [10.0 / (PI * area * sides); 3], 0.01, shape);
+    }
+}
+
+/// Light that is a picture on a shape: its codes are sRGB, its first row is at v = 1, and its mean has the power.
+#[test]
+fn area_lights_show_pictures() {
+    let mut picture = image::RgbImage::from_pixel(1, 2, image::Rgb([255; 3]));
+    picture.put_pixel(0, 1, image::Rgb([188, 0, 0]));
+    let mut png = std::io::Cursor::new(vec![]);
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let folder = Folder::new().with("a.png", png.into_inner());
+    let red = ((188.0f32 / 255.0 + 0.055) / 1.055).powf(2.4);
+    // The camera looks at the middle: the upper half of the picture above it, and the lower below
+    let at = |y: f32, more: &str| {
+        let quad = format!(
+            "Translate 0 {y} 0 Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
+            \"point2 uv\" [0 0 1 0 1 1 0 1] \"integer indices\" [0 1 2 0 2 3]"
+        );
+        folder.see(&format!("AreaLightSource \"diffuse\" \"string filename\" \"a.png\" {more}\n{quad}"))
+    };
+    close(at(-0.5, ""), [1.0; 3], 1e-3, "top");
+    close(at(0.5, ""), [red, 0.0, 0.0], 1e-3, "bottom");
+    close(at(-0.5, "\"float scale\" 5"), [5.0; 3], 1e-3, "scaled");
+    let mean = (1.0 + 0.2126 * red) / 2.0;
+    close(at(-0.5, "\"float power\" 10"), [10.0 / (PI * 4.0 * mean); 3], 2e-3, "power");
+}
+
+/// A map has the illuminance that pbrt gives it, which takes 2π for the sphere of 4π.
+#[test]
+fn maps_have_the_illuminance_that_is_asked_for() {
+    let folder = Folder::new().with_exr("sky.exr", 64, &[[3.0; 3]; 64 * 64]);
+    let world = format!(
+        "LightSource \"infinite\" \"string filename\" \"sky.exr\" \"float illuminance\" 7\n{GREY}{SQUARE}"
+    );
+    // A sky of 1 makes ½ there: the cosine over half of the pixels has the mean ½
+    close(folder.see(&world), [7.0 / (2.0 * PI * 0.25) * 0.5; 3], 0.02, "map");
+}
+
+/// `ColorSpace` says what the numbers of colours are, of lights and of surfaces, in its block.
+#[test]
+fn colours_are_of_their_space() {
+    let folder = Folder::new();
+    // ITU-R BT.2087, table 2
+    let mixed = [0.5183, 0.5022, 0.2206];
+    let light = "AreaLightSource \"diffuse\" \"rgb L\" [.5 .5 .25]\n";
+    close(folder.see(&format!("ColorSpace \"rec2020\" {light}{SQUARE}")), mixed, 2e-3, "light");
+    close(
+        folder.see(&format!("AttributeBegin ColorSpace \"rec2020\" AttributeEnd {light}{SQUARE}")),
+        [0.5, 0.5, 0.25],
+        1e-3,
+        "outside",
+    );
+    let surface = "ColorSpace \"rec2020\" Material \"diffuse\" \"rgb reflectance\" [.5 .5 .25]\n";
+    close(folder.see(&format!("{SKY}{surface}{SQUARE}")), mixed, 2e-3, "surface");
 }

@@ -25,6 +25,12 @@ impl Folder {
         self
     }
 
+    pub(crate) fn with_exr(self, name: &str, width: usize, pixels: &[Rgb]) -> Self {
+        let layers = noisefloor_image::RenderLayers::rgb(width, pixels.len() / width, pixels);
+        noisefloor_image::write_exr(self.path().join(name), &layers).unwrap();
+        self
+    }
+
     pub(crate) fn load_with(&self, text: &str, options: &LoadOptions) -> Result<Loaded, String> {
         let path = self.path().join("scene.pbrt");
         std::fs::write(&path, text).unwrap();

@@ -1,7 +1,9 @@
 //! Colour look-up tables as the text of `.cube` files (Adobe, "Cube LUT Specification 1.0", and Resolve's 1D before 3D).
 
 use crate::display::lut::{ColourLut, LutTable};
+
 use crate::rgb::Rgb;
+use crate::text::{lines, stand_in, text};
 use thiserror::Error;
 
 /// Entries along one edge.
@@ -9,6 +11,7 @@ const SIZE_1D: std::ops::RangeInclusive<usize> = 2..=65_536;
 const SIZE_3D: std::ops::RangeInclusive<usize> = 2..=129;
 /// The shortest entry: three digits, and what separates them.
 const ENTRY_BYTES: usize = 6;
+const BAD_ROW: &str = "three finite numbers are expected";
 /// Larger numbers could not be mixed in single precision.
 const LARGEST: f32 = 1e30;
 
@@ -22,7 +25,13 @@ pub enum CubeError {
         /// Counted from 1.
         line: usize,
         /// What it should be.
-        reason: &'static str,
+        reason: String,
+    },
+    /// The bytes are known to be something else.
+    #[error("{instead}")]
+    Foreign {
+        /// What they are, and what to do.
+        instead: &'static str,
     },
     /// No size is given.
     #[error("it has neither LUT_1D_SIZE (2 to 65536) nor LUT_3D_SIZE (2 to 129)")]
@@ -52,19 +61,26 @@ pub enum CubeError {
 ///
 /// # Errors
 /// [`CubeError`] if it is broken.
-pub fn parse_cube(text: &[u8]) -> Result<ColourLut, CubeError> {
-    let mut head = Head::default();
-    // A byte order mark, as Windows writes it
-    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let lines = text.split(|&b| b == b'\n').enumerate().map(|(i, line)| {
-        let line = line.split(|&b| b == b'#').next().unwrap_or_default();
-        (i + 1, String::from_utf8_lossy(line).trim().to_owned())
-    });
-    let mut lines = lines.filter(|(_, line)| !line.is_empty()).peekable();
+pub fn parse_cube(bytes: &[u8]) -> Result<ColourLut, CubeError> {
+    if let Some(instead) = stand_in(bytes) {
+        return Err(CubeError::Foreign { instead });
+    }
+    let text = text(bytes);
+    // DOS ended files by ^Z, and some programs end them by a NUL
+    let text = text.trim_end_matches(|c: char| matches!(c, '\0' | '\x1a') || c.is_whitespace());
+    let contents =
+        lines(text).enumerate().map(|(i, line)| (i + 1, line.split('#').next().unwrap_or_default().trim()));
+    let contents = contents.filter(|(_, line)| !line.is_empty());
+    // `nan` and `inf` are no keywords but bad numbers
+    let is_keyword = |line: &str| {
+        let word = line.split_whitespace().next().unwrap_or_default();
+        word.starts_with(char::is_alphabetic) && word.parse::<f32>().is_err()
+    };
 
-    // Keywords come before entries
-    while let Some((line, keyword)) = lines.next_if(|(_, line)| line.starts_with(char::is_alphabetic)) {
-        head.take(&keyword).map_err(|reason| CubeError::Line { line, reason })?;
+    // Keywords come first, but some programs write the domain last
+    let mut head = Head::default();
+    for (line, keyword) in contents.clone().filter(|(_, line)| is_keyword(line)) {
+        head.take(keyword).map_err(|reason| CubeError::Line { line, reason })?;
     }
     let [first, second] = head.ranges()?;
     let entries = [head.size_1d.unwrap_or(0), head.size_3d.map_or(0, |n| n.pow(3))];
@@ -73,17 +89,17 @@ pub fn parse_cube(text: &[u8]) -> Result<ColourLut, CubeError> {
         return Err(CubeError::NoSize);
     }
     if expected > text.len() / ENTRY_BYTES + 1 {
-        return Err(CubeError::Short { expected, bytes: text.len() });
+        return Err(CubeError::Short { expected, bytes: bytes.len() });
     }
 
     // Entries: those of the 1D LUT first
     let mut values: Vec<Rgb> = Vec::with_capacity(expected);
-    for (line, entry) in lines {
+    for (line, entry) in contents.filter(|(_, line)| !is_keyword(line)) {
         if values.len() == expected {
             return Err(CubeError::Entries { expected, got: expected + 1 });
         }
-        let reason = "three finite numbers are expected";
-        values.push(numbers(&entry).ok_or(CubeError::Line { line, reason })?);
+        let bad = || CubeError::Line { line, reason: BAD_ROW.to_owned() };
+        values.push(numbers(entry).ok_or_else(bad)?);
     }
     if values.len() < expected {
         return Err(CubeError::Entries { expected, got: values.len() });
@@ -105,7 +121,7 @@ struct Head {
 }
 
 impl Head {
-    fn take(&mut self, line: &str) -> Result<(), &'static str> {
+    fn take(&mut self, line: &str) -> Result<(), String> {
         let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let size =
             |sizes: std::ops::RangeInclusive<usize>| rest.trim().parse().ok().filter(|n| sizes.contains(n));
@@ -114,16 +130,19 @@ impl Head {
             (low < high).then_some([[low; 3], [high; 3]])
         };
         let bad_range = "two finite numbers are expected, the lower one first";
-        let bad_domain = "three finite numbers are expected";
-        match keyword {
+        match keyword.to_ascii_uppercase().as_str() {
             "TITLE" => {}
             "LUT_1D_SIZE" => self.size_1d = Some(size(SIZE_1D).ok_or("a 1D LUT has 2 to 65536 entries")?),
             "LUT_3D_SIZE" => self.size_3d = Some(size(SIZE_3D).ok_or("a 3D LUT has an edge of 2 to 129")?),
-            "DOMAIN_MIN" => self.domain[0] = Some(numbers(rest).ok_or(bad_domain)?),
-            "DOMAIN_MAX" => self.domain[1] = Some(numbers(rest).ok_or(bad_domain)?),
+            "DOMAIN_MIN" => self.domain[0] = Some(numbers(rest).ok_or(BAD_ROW)?),
+            "DOMAIN_MAX" => self.domain[1] = Some(numbers(rest).ok_or(BAD_ROW)?),
             "LUT_1D_INPUT_RANGE" => self.range_1d = Some(range().ok_or(bad_range)?),
             "LUT_3D_INPUT_RANGE" => self.range_3d = Some(range().ok_or(bad_range)?),
-            _ => return Err("this keyword is not known; SIZE, DOMAIN, INPUT_RANGE and TITLE are"),
+            _ => {
+                let keyword: String = keyword.chars().take(40).collect();
+                let known = "TITLE, LUT_1D_SIZE, LUT_3D_SIZE, DOMAIN_… and LUT_…_INPUT_RANGE are";
+                return Err(format!("the keyword {keyword:?} is not known; {known}"));
+            }
         }
         Ok(())
     }

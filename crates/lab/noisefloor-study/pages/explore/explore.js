@@ -5,6 +5,7 @@ import { Learning } from "./learn.js";
 import { PersonalLine } from "./line.js";
 import { legend, row } from "./parts.js";
 import * as server from "./server.js";
+import { Viewer } from "./viewer.js";
 
 const get = (id) => document.getElementById(id);
 const TILES = [32, 64, 128, 200, 256, 512];
@@ -14,6 +15,7 @@ const ASKED = 64;
 let t;
 let state;
 let grid;
+let viewer;
 let learning;
 let line;
 /** Judged pictures by increasing samples, and which of them is shown. */
@@ -150,7 +152,7 @@ async function look() {
 function blank() {
   view = null;
   say("");
-  for (const id of ["verdict", "answers", "yours", "learn", "frame"]) get(id).hidden = true;
+  for (const id of ["verdict", "view", "answers", "yours", "learn", "frame"]) get(id).hidden = true;
   get("welcome").hidden = false;
   // With pictures and nothing judged, the share of people and the level would have nothing to act on
   if (levels.length > 1) get("verdict").hidden = false;
@@ -159,14 +161,15 @@ function blank() {
 async function draw(picture, order) {
   const which = `${picture.id} ${turn}`;
   if (!shown.startsWith(picture.id)) {
-    const drawn = [["picture", "shown"], ...(view.has_noise_map ? [["noise", "noise"]] : [])];
-    const bitmaps = await Promise.all(drawn.map(([, path]) => server.image(picture.id, path, turn)));
+    const noise = view.has_noise_map ? await server.image(picture.id, "noise", turn) : null;
     if (order !== turn) return;
-    drawn.forEach(([id], i) => {
-      const [canvas, bitmap] = [get(id), bitmaps[i]];
-      [canvas.width, canvas.height] = [bitmap.width, bitmap.height];
-      canvas.getContext("2d", { alpha: false }).drawImage(bitmap, 0, 0);
-    });
+    if (noise) {
+      [get("noise").width, get("noise").height] = [noise.width, noise.height];
+      get("noise").getContext("2d", { alpha: false }).drawImage(noise, 0, 0);
+    }
+    get("frame").hidden = false;
+    await viewer.show(picture, levels, turn);
+    if (order !== turn) return;
     shown = which;
   }
   get("picture").setAttribute(
@@ -174,9 +177,9 @@ async function draw(picture, order) {
     fill(t.picture_label, { name: picture.name, spp: picture.spp }),
   );
   get("welcome").hidden = true;
-  for (const id of ["verdict", "answers", "yours", "learn", "frame"]) get(id).hidden = false;
+  for (const id of ["verdict", "view", "answers", "yours", "learn", "frame"]) get(id).hidden = false;
   fit();
-  grid.show(view);
+  grid.show(view, viewer.zoom);
   layers();
   summarise();
   await line.show(question());
@@ -184,10 +187,16 @@ async function draw(picture, order) {
 
 function fit() {
   const { width, height } = get("picture");
-  for (const id of ["picture", "noise", "frame"]) {
-    get(id).style.width = `${width / devicePixelRatio}px`;
-    get(id).style.height = `${height / devicePixelRatio}px`;
+  for (const id of ["picture", "beside", "noise", "frame"]) {
+    get(id).style.width = `${(width * viewer.zoom) / devicePixelRatio}px`;
+    get(id).style.height = `${(height * viewer.zoom) / devicePixelRatio}px`;
   }
+}
+
+function resized() {
+  fit();
+  grid.show(view, viewer.zoom);
+  summarise();
 }
 
 function layers() {
@@ -196,6 +205,7 @@ function layers() {
   get("legend").hidden = !noise;
   get("show-noise").disabled = !view.has_noise_map;
   get("tiles").classList.toggle("bare", !get("show-verdicts").checked);
+  get("tiles").classList.toggle("needs", get("show-need").checked);
 }
 
 function summarise() {
@@ -211,6 +221,7 @@ function summarise() {
   const unfamiliar = tiles.filter((tile) => tile.unfamiliar).length;
   if (unfamiliar > 0) notes.push(fill(t.unfamiliar, { n: unfamiliar }));
   if (!Number.isInteger(devicePixelRatio)) notes.unshift(t.scaled);
+  if (viewer.zoom > 1) notes.unshift(fill(t.enlarged, { n: viewer.zoom }));
   get("note").textContent =
     state.model.evidence === "halves" ? notes.join(" ") : notes.slice(0, -1).join(" ");
   get("model").textContent = fill(retrained ? t.model_retrained : t.model, {
@@ -305,7 +316,7 @@ function listen() {
       await look();
     }),
   );
-  for (const id of ["show-verdicts", "show-noise"]) get(id).addEventListener("change", layers);
+  for (const id of ["show-verdicts", "show-noise", "show-need"]) get(id).addEventListener("change", layers);
   get("undo").addEventListener("click", undo);
   document.addEventListener("dragover", (event) => {
     event.preventDefault();
@@ -331,18 +342,16 @@ function listen() {
       !view
     )
       return;
-    const box = { v: "show-verdicts", n: "show-noise" }[event.key.toLowerCase()];
+    const box = { v: "show-verdicts", n: "show-noise", m: "show-need" }[event.key.toLowerCase()];
     if (box && !get(box).disabled) {
       get(box).checked = !get(box).checked;
       layers();
+    } else if (viewer.key(event.key)) {
+      event.preventDefault();
     }
   });
   window.addEventListener("resize", () => {
-    if (view) {
-      fit();
-      grid.show(view);
-      summarise();
-    }
+    if (view) resized();
   });
 }
 
@@ -353,6 +362,7 @@ async function start() {
   speak();
   legend();
   grid = new Grid(get("tiles"), t, answer, undo);
+  viewer = new Viewer(t, () => view && resized(), problem);
   learning = new Learning(
     t,
     does(async (use) => {

@@ -10,7 +10,9 @@ export class Grid {
     element.addEventListener("keydown", (pressed) => this.key(pressed));
   }
 
-  show(view) {
+  /** `zoom` says how many pixels of the screen one of the picture has on each side. */
+  show(view, zoom) {
+    this.zoom = zoom;
     if (this.buttons.length !== view.tiles.length) {
       this.buttons = view.tiles.map((_, i) => {
         const button = document.createElement("button");
@@ -32,7 +34,7 @@ export class Grid {
 
   draw(button, tile) {
     const { t } = this;
-    const ratio = devicePixelRatio;
+    const ratio = devicePixelRatio / this.zoom;
     for (const [name, value] of [
       ["left", tile.x],
       ["top", tile.y],
@@ -47,8 +49,12 @@ export class Grid {
       small ? "small" : "",
       tile.said ? "answered" : "",
     ].join(" ");
+    // On a scale of doublings, around the samples that the picture has
+    const need = tile.converged ? this.view.spp : (tile.expected_spp ?? Infinity);
+    const doublings = Math.min(Math.max(Math.log2(need / this.view.spp), 0), 6);
+    button.style.setProperty("--need", `hsl(${220 - 33 * doublings} 90% 50% / 0.45)`);
     const p = tile.probability.toFixed(2);
-    const need = tile.converged
+    const words_of_need = tile.converged
       ? ""
       : tile.expected_spp === null
         ? t.need_beyond
@@ -60,7 +66,7 @@ export class Grid {
       column: (tile.tile % this.columns) + 1,
       verdict: tile.converged ? t.converged : t.noisy,
       p,
-      need,
+      need: words_of_need,
       unfamiliar: tile.unfamiliar ? t.label_unfamiliar : "",
       said: tile.said ? (said ? t.said_noise : t.said_none) : "",
       opposite,
@@ -77,8 +83,8 @@ export class Grid {
     const words = [`${tile.converged ? "✓" : "✗"}${tile.unfamiliar ? " ?" : ""}`];
     if (!small) words.push(`P ${p}`);
     const chips = [chip("top", words.join("  "))];
-    if (!tile.converged)
-      chips.push(chip("need", tile.expected_spp === null ? "→ ∞" : `→ ${short(tile.expected_spp)}`));
+    if (tile.converged) chips.push(chip("enough", `${short(this.view.spp)} spp`));
+    else chips.push(chip("need", tile.expected_spp === null ? "→ ∞" : `→ ${short(tile.expected_spp)} spp`));
     // Drawn by the style: the label says it in its own words
     if (tile.said) button.dataset.said = small ? (said ? "✗!" : "✓!") : said ? t.you_noise : t.you_none;
     else delete button.dataset.said;

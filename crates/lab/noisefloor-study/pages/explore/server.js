@@ -23,8 +23,9 @@ export const retrain = (people) => ask("api/retrain", json("POST", { people }));
 export const progress = () => ask("api/retrain");
 
 /** A picture's PNG, its values as they are: no profile of the screen may touch them. */
-export async function image(id, which, revision) {
-  const answer = await fetch(`api/pictures/${id}/${which}.png?${revision}`, { cache: "no-store" });
+export async function image(id, which, revision, stops = 0) {
+  const query = `revision=${revision}&stops=${stops}`;
+  const answer = await fetch(`api/pictures/${id}/${which}.png?${query}`, { cache: "no-store" });
   if (!answer.ok) throw new Refused(answer.status, await answer.json());
   return createImageBitmap(await answer.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
 }

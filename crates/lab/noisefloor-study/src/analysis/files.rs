@@ -61,8 +61,8 @@ struct ClassLine {
     observers_high: Option<f64>,
 }
 
-/// Writes `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`, `classes.csv`, plots,
-/// `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes. Loops are not part
+/// Writes `index.html` with all plots, `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`,
+/// `classes.csv`, plots, `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes. Loops are not part
 /// of that: models are trained on stills, and their thresholds are those of films. What was there is
 /// replaced.
 ///
@@ -75,6 +75,7 @@ pub fn write(
     threshold: CorpusThreshold,
 ) -> Result<(), StudyError> {
     folder(dir)?;
+    let mut page = Page::default();
     write_atomic(dir.join("report.json"), |to| serde_json::to_writer_pretty(to, report))?;
     write_csv(dir.join("observers.csv"), &report.observers)?;
     if !report.classes.is_empty() {
@@ -90,12 +91,14 @@ pub fn write(
         };
         write_csv(dir.join("classes.csv"), report.classes.iter().map(line))?;
         svg(&dir.join("classes.svg"), plots::classes(&report.classes)?)?;
+        page.add("How often pairs are called identical", "classes.svg", "classes.csv");
     }
     if report.tiles.is_empty() {
-        return Ok(());
+        return page.write(dir, report);
     }
     write_csv(dir.join("tiles.csv"), report.tiles.iter().map(tile_line))?;
     svg(&dir.join("thresholds.svg"), plots::thresholds(&report.tiles)?)?;
+    page.add("Thresholds of the tiles", "thresholds.svg", "tiles.csv");
     // A model keeps the name of the corpus it is trained on.
     let corpus_dir = dir.join(if report.simulated { "corpus-simulated" } else { "corpus" });
     for (number, stack) in study.stacks.iter().enumerate() {
@@ -103,15 +106,57 @@ pub fn write(
         if tiles.is_empty() {
             continue;
         }
-        svg(&dir.join(format!("curves-{}.svg", stack.name())), plots::curves(&tiles, stack.levels())?)?;
+        let (name, curves, map) =
+            (stack.name(), format!("curves-{}.svg", stack.name()), format!("grid-{}.png", stack.name()));
+        svg(&dir.join(&curves), plots::curves(&tiles, stack.levels())?)?;
         let picture = stack.shown(stack.last())?;
         let grid = plots::grid(stack.grid(), &picture, &tiles, threshold);
-        grid.save(dir.join(format!("grid-{}.png", stack.name())))?;
+        grid.save(dir.join(&map))?;
+        page.add(&format!("{name}: who sees no difference"), &curves, "tiles.csv");
+        let what = if threshold == CorpusThreshold::Mean { "the mean" } else { "the 95 % level" };
+        page.add(&format!("{name}: {what} in samples per pixel, as `train` gets it"), &map, "tiles.csv");
         if stack.fps().is_none() {
             pictures(&corpus_dir, study, number)?;
         }
     }
-    corpus(&corpus_dir, study, report, threshold)
+    corpus(&corpus_dir, study, report, threshold)?;
+    page.write(dir, report)
+}
+
+/// All plots on one page, which opens without a server.
+#[derive(Default)]
+struct Page(String);
+
+impl Page {
+    /// A plot, and the table that it is of; both are files beside the page.
+    fn add(&mut self, title: &str, plot: &str, table: &str) {
+        let [title, plot] = [title, plot].map(escaped);
+        self.0 += &format!(
+            "<section>\n<h2>{title}</h2>\n<img src=\"{plot}\" alt=\"{title}\">\n<p><a href=\"{table}\">{table}</a></p>\n\
+             </section>\n"
+        );
+    }
+
+    fn write(self, dir: &Path, report: &StudyReport) -> Result<(), StudyError> {
+        let who = if report.simulated { "simulated observers" } else { "observers" };
+        let left = report.observers.iter().filter(|row| row.excluded.is_some()).count();
+        let page = format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+             <meta name=\"viewport\" content=\"width=device-width\"><title>noisefloor-lab study analyse</title>\n\
+             <style>body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }}\n\
+             img {{ max-width: 100%; height: auto }}</style></head>\n<body>\n<h1>{} {who}</h1>\n\
+             <p>{left} of them excluded. <a href=\"observers.csv\">observers.csv</a>, \
+             <a href=\"report.json\">report.json</a></p>\n{}</body></html>\n",
+            report.observers.len(),
+            self.0
+        );
+        Ok(write_atomic(dir.join("index.html"), |to| to.write_all(page.as_bytes()))?)
+    }
+}
+
+/// Text as HTML has it.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
 fn folder(dir: &Path) -> Result<(), StudyError> {

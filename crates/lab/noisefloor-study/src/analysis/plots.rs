@@ -43,9 +43,14 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
         chart
             .configure_mesh()
             .disable_x_mesh()
+            .x_labels(tiles.len().clamp(2, 16))
             .x_desc("tile, in the order of tiles.csv (blue: mean; red: 95 % see no difference)")
             .y_desc("samples per pixel")
-            .x_label_formatter(&|x| format!("{x:.0}"))
+            // Only where there is a tile
+            .x_label_formatter(&|x| match (x.round() - x).abs() < 1e-6 {
+                true => format!("{}", x.round() as i64),
+                false => String::new(),
+            })
             .y_label_formatter(&|spp| format!("{spp:.0}"))
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)

@@ -11,7 +11,7 @@ use axum::body::Body;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, State};
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use noisefloor::{
     Audience, People,
@@ -222,10 +222,18 @@ pub(crate) async fn arrange(State(app): Shared, body: Body) -> Answer {
     state(State(app)).await
 }
 
-/// `GET /api/pictures/{id}/shown.png`
-pub(crate) async fn shown(State(app): Shared, id: Named) -> Answer {
+/// Most stops by which a picture is shown brighter or darker.
+const MOST_STOPS: f32 = 20.0;
+
+/// `GET /api/pictures/{id}/shown.png?stops=0`: `stops` says by how many it is shown brighter.
+pub(crate) async fn shown(State(app): Shared, id: Named, uri: Uri) -> Answer {
     let tiles = tiles(&app, id).await?;
-    png(move || images::shown(&tiles)).await
+    let asked = uri.query().into_iter().flat_map(|query| query.split('&')).find_map(|pair| pair.strip_prefix("stops="));
+    let stops = asked.map_or(Ok(0.0), str::parse).ok().filter(|stops: &f32| stops.abs() <= MOST_STOPS);
+    let Some(stops) = stops else {
+        return Err(refuse("that is no exposure in stops", "stops", "ask for a number from -20 to 20"));
+    };
+    png(move || images::shown(&tiles, stops)).await
 }
 
 /// `GET /api/pictures/{id}/noise.png`

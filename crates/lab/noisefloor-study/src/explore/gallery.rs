@@ -7,7 +7,7 @@ use noisefloor::{
     stills::{Still, StillError},
     tile::TileError,
 };
-use noisefloor_image::{read_facts, read_picture_within};
+use noisefloor_image::{ReadOptions, read_facts, read_picture_with};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -76,7 +76,8 @@ impl GalleryPicture {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, StudyError> {
         let path = path.as_ref();
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let picture = read_picture_within(path, MAX_GALLERY_PIXELS)?;
+        let options = ReadOptions { most_pixels: MAX_GALLERY_PIXELS, ..ReadOptions::default() };
+        let picture = read_picture_with(path, &options)?;
         let facts = read_facts(path)?;
         // Tiles of different counts have none in common: the page asks
         let spp = match facts.samples {
@@ -92,6 +93,11 @@ impl GalleryPicture {
             .map_err(|source| StudyError::Io { path: path.to_owned(), source })?;
         let id = hash.finalize().to_hex()[..32].to_owned();
         Ok(Self { id, name, counted: spp.is_some(), still: Arc::new(still) })
+    }
+
+    /// The same by another name.
+    pub(crate) fn called(self, name: String) -> Self {
+        Self { name, ..self }
     }
 
     /// Samples per pixel, if known.
@@ -143,7 +149,7 @@ impl Gallery {
     }
 
     /// Adds a picture, unless it is there already.
-    pub(crate) fn add(&mut self, picture: GalleryPicture) -> Result<(), GalleryError> {
+    pub(crate) fn add(&mut self, mut picture: GalleryPicture) -> Result<(), GalleryError> {
         if self.pictures.iter().any(|p| p.id == picture.id) {
             return Ok(());
         }
@@ -159,6 +165,12 @@ impl Gallery {
             first.still.fits(&picture.still).map_err(misfit)?;
         }
         check_grid(&picture.still, self.tile)?;
+        // A browser does not say from which folder a file comes
+        let (own, mut copies) = (picture.name.clone(), 1);
+        while self.pictures.iter().any(|p| p.name == picture.name) {
+            copies += 1;
+            picture.name = format!("{own} ({copies})");
+        }
         self.pictures.push(picture);
         self.changed();
         Ok(())

@@ -3,14 +3,16 @@
 use super::verdicts::Tiles;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
+use noisefloor::Rgb;
 
 /// Range of the noise map, as in `noisefloor judge --noise-map`: logarithmic, 1 is just seen.
 const SCALE: [f32; 2] = [0.25, 4.0];
 
-/// The picture as displayed.
-pub(crate) fn shown(tiles: &Tiles) -> Result<Vec<u8>, ImageError> {
-    let byte = |c: &f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
-    encode(tiles, tiles.shown.iter().flatten().map(byte).collect())
+/// The picture as displayed, so many stops brighter.
+pub(crate) fn shown(tiles: &Tiles, stops: f32) -> Result<Vec<u8>, ImageError> {
+    let byte = |c: f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
+    let shown = |p: &Rgb| tiles.display.encode(p.map(|c| c * stops.exp2())).map(byte);
+    encode(tiles, tiles.still.pixels.iter().flat_map(shown).collect())
 }
 
 /// The map of visible noise; `None` if the descriptor has none.

@@ -9,7 +9,7 @@ use noisefloor_pages::http::{ASK, HTML, LOOK, PageFile, Refusal, SCRIPT, STYLE, 
 use noisefloor_pages::languages::parse_language;
 
 const PAGE: &str = include_str!("../../pages/explore/index.html");
-const FILES: [PageFile; 9] = [
+const FILES: [PageFile; 10] = [
     ASK,
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
@@ -17,6 +17,7 @@ const FILES: [PageFile; 9] = [
     ("line.js", SCRIPT, include_str!("../../pages/explore/line.js")),
     ("parts.js", SCRIPT, include_str!("../../pages/explore/parts.js")),
     ("server.js", SCRIPT, include_str!("../../pages/explore/server.js")),
+    ("viewer.js", SCRIPT, include_str!("../../pages/explore/viewer.js")),
     LOOK,
     ("explore.css", STYLE, include_str!("../../pages/explore/explore.css")),
 ];

@@ -2,8 +2,9 @@
 
 use super::gallery::{Gallery, GalleryError, GalleryPicture};
 use noisefloor::{
-    Audience, Model, Oracle, People, Rgb, TileGrid, ToneMapping, Verdict, Viewing,
+    Audience, Model, Oracle, People, TileGrid, ToneMapping, Verdict, Viewing,
     descriptor::{Described, Descriptor},
+    display::Display,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
 };
@@ -18,8 +19,9 @@ pub(crate) struct Tiles {
     pub(crate) spp: f64,
     pub(crate) samples: Samples,
     pub(crate) described: Vec<Described>,
-    /// Pixels as displayed, row-major.
-    pub(crate) shown: Vec<Rgb>,
+    /// The picture in linear light, and the display that shows it.
+    pub(crate) still: Arc<Still>,
+    pub(crate) display: Display,
     /// Visible noise as a multiple of what is just seen, row-major; `None` if the descriptor has no such map.
     pub(crate) noise: Option<Vec<f32>>,
 }
@@ -72,7 +74,8 @@ fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Res
     let oracle = Oracle::new(model.clone(), People::DEFAULT);
     let described = held.describe(&oracle, grid)?;
     let noise = oracle.map_visible_noise(grid, &described, model.audience());
-    Ok(Tiles { grid, spp, samples: held.samples(), described, shown: held.shown(), noise })
+    let (still, display) = (picture.still.clone(), held.display().clone());
+    Ok(Tiles { grid, spp, samples: held.samples(), described, still, display, noise })
 }
 
 /// A question about a picture.

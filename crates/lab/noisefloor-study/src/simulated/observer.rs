@@ -127,11 +127,25 @@ impl Public {
     /// reference, over observers and showings, without bias and lapses. Found from 400 001 draws; accurate
     /// to about 0.4 % at 95 %.
     pub fn quantile(&self, stack: usize, tile: usize, share: f64) -> f64 {
+        self.thresholds[stack][tile] * self.spread()[(share * 400_000.0).round() as usize].exp()
+    }
+
+    /// What an analysis should find of a tile: the median over observers and showings, the mean over observers, which
+    /// `train` gets, and the level where 95 % see no difference. The mean lies above the median: few need much more.
+    pub fn levels(&self, stack: usize, tile: usize) -> [f64; 3] {
+        let median = self.thresholds[stack][tile];
+        let mut random = noisefloor_pages::random::seeded(0);
+        let own = (0..400_001).map(|_| (self.between * self.shape.draw(&mut random)).exp());
+        [median, median * own.sum::<f64>() / 400_001.0, self.quantile(stack, tile, 0.95)]
+    }
+
+    /// How far observers and showings lie from the median, in ln(spp), in ascending order.
+    fn spread(&self) -> Vec<f64> {
         let mut random = noisefloor_pages::random::seeded(0);
         let mut draw = |_| self.between * self.shape.draw(&mut random) + logistic(&mut random, self.within);
         let mut sums: Vec<f64> = (0..400_001).map(&mut draw).collect();
         sums.sort_by(f64::total_cmp);
-        self.thresholds[stack][tile] * sums[(share * 400_000.0).round() as usize].exp()
+        sums
     }
 }
 
@@ -339,5 +353,9 @@ mod tests {
         let expected = 1000.0 * (0.3 * 19f64.ln()).exp();
         assert!((public.quantile(0, 0, 0.95) / expected - 1.0).abs() < 0.01);
         assert!((public.quantile(0, 0, 0.5) / 1000.0 - 1.0).abs() < 0.01);
+        // The mean of exp of a logistic value of scale s is πs/sin(πs)
+        let [median, mean, level95] = public.levels(0, 0);
+        let above = 0.3 * std::f64::consts::PI / (0.3 * std::f64::consts::PI).sin();
+        assert!((mean / median / above - 1.0).abs() < 0.02 && (level95 / expected - 1.0).abs() < 0.01);
     }
 }

@@ -63,7 +63,7 @@ fn thresholds_come_back_from_the_server_as_a_corpus() {
     }
     assert_eq!(corpus.scene_levels("wall").unwrap().count(), 48);
     for file in
-        ["report.json", "observers.csv", "tiles.csv", "thresholds.svg", "curves-wall.svg", "grid-door.png"]
+        ["index.html", "report.json", "observers.csv", "tiles.csv", "thresholds.svg", "curves-wall.svg", "grid-door.png"]
     {
         assert!(out.join(file).metadata().unwrap().len() > 100, "{file}");
     }

@@ -2,6 +2,7 @@
 
 use crate::bars::Bars;
 use anyhow::Context;
+use noisefloor::internal::told_apart;
 use noisefloor::{Params, SourceInfo, StoppingCriterion};
 use noisefloor_cli::end::Usage;
 use noisefloor_cli::files::read_reference;
@@ -14,6 +15,7 @@ use noisefloor_lab::compare::{
     self, Comparison, Converged, Cost, Entrant, Labels, ReferenceJob, Setting, render_reference,
 };
 use noisefloor_lab::{Advance, LabError};
+use std::collections::HashSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -64,15 +66,18 @@ pub fn run(mut job: CompareJob) -> anyhow::Result<ExitCode> {
     cancel_on_signal(Arc::clone(&cancel), AFTER_THIS_BATCH)?;
 
     let (mut all, mut sections) = (Vec::new(), Vec::new());
-    for scene in &job.scenes {
+    let mut taken = HashSet::new();
+    let names = told_apart(&job.scenes.iter().map(Path::new).collect::<Vec<_>>());
+    for (scene, name) in job.scenes.iter().zip(&names) {
         let source = SourceJob { scene: Some(scene.into()), ..job.source.clone() };
-        let (comparison, section) = match one(job, &source, denoiser.as_deref_mut(), &cancel) {
-            Err(error) if matches!(error.downcast_ref(), Some(LabError::Cancelled { .. })) => {
-                note!("warning: {}", one_line(&error));
-                return Ok(ExitCode::from(INTERRUPTED));
-            }
-            outcome => outcome?,
-        };
+        let (comparison, section) =
+            match one(job, &source, name, &mut taken, denoiser.as_deref_mut(), &cancel) {
+                Err(error) if matches!(error.downcast_ref(), Some(LabError::Cancelled { .. })) => {
+                    note!("warning: {}", one_line(&error));
+                    return Ok(ExitCode::from(INTERRUPTED));
+                }
+                outcome => outcome?,
+            };
         let cancelled = comparison.cancelled;
         // All that there is so far, so that a page is there whatever comes after
         all.push(comparison);
@@ -90,16 +95,24 @@ pub fn run(mut job: CompareJob) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Compares on one scene, and writes what is of that scene alone. With its section of the page.
+/// Compares on one scene, which is called `name` if another has its own, and writes what is of that scene alone. With
+/// its section of the page.
 fn one(
     job: &CompareJob,
     source_job: &SourceJob,
+    name: &str,
+    taken: &mut HashSet<String>,
     denoiser: Option<&mut (dyn Denoiser + 'static)>,
     cancel: &AtomicBool,
 ) -> anyhow::Result<(Comparison, String)> {
     let opened = source_job.open(job.resources)?;
     opened.warn();
-    let Opened { mut source, scene, .. } = opened;
+    let Opened { mut source, mut scene, .. } = opened;
+    // Each scene has a folder of its own
+    if !taken.insert(scene.clone()) {
+        scene = name.replace(['/', '\\'], "-");
+        taken.insert(scene.clone());
+    }
     let SourceInfo { width, height, .. } = source.info();
     let folder = job.out.join(&scene);
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;

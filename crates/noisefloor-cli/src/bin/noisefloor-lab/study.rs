@@ -154,13 +154,13 @@ fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
     drop(stop);
     runtime.block_on(served).context("the server ended early")??;
     say!("{events} events acknowledged; analyse them with --simulated, which should find:")?;
-    say!("stack                tile    median  95 % see none")?;
+    say!("{}", report::COLUMNS)?;
     for (number, stack) in study.stacks.iter().enumerate() {
         for tile in 0..stack.grid().len() {
-            let [median, level95] = [0.5, 0.95].map(|share| public.quantile(number, tile, share));
-            say!("{:20} {tile:4} {median:9.0} {level95:14.0}", stack.name())?;
+            report::say_levels(stack.name(), tile, public.levels(number, tile), "")?;
         }
     }
+    say!("{}", report::WHAT_TRAIN_GETS)?;
     Ok(())
 }
 

@@ -112,7 +112,7 @@ mod page {
 
     pub(super) fn ask(job: AskJob) -> anyhow::Result<()> {
         let AskJob { person: name, out, listen, allow_host } = job;
-        Eyes::check_keep(&out, &name).context("the result could not be kept")?;
+        Eyes::check_keep(&out, &name).context("nothing was asked, since the result cannot be kept")?;
         let today = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
         let keep = move |person| match Eyes::keep(&out, person) {
             Ok(()) => Ok(out.display().to_string()),

@@ -14,8 +14,8 @@ use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::sources::{Resources, SourceKind};
 use noisefloor_cli::{note, say};
 use noisefloor_farm::{
-    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameRange, FrameSource, FrameState,
-    News, RenderFiles, Round, Slurm, Studio, StudioError, merge_shards,
+    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameSource, FrameState, Frames, News,
+    RenderFiles, Round, Slurm, Studio, StudioError, merge_shards,
 };
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
@@ -40,7 +40,7 @@ pub enum FarmTask {
 
 pub struct PlanTask {
     pub dir: PathBuf,
-    pub frames: Option<FrameRange>,
+    pub frames: Option<Frames>,
     pub tasks: usize,
     pub keep: bool,
     /// None to plan the next round of what is there.
@@ -233,7 +233,7 @@ impl Studio for Here {
     type Job = FarmRender;
     const CHECKPOINT: &'static str = JOB;
 
-    fn of_frame(&self, render: &FarmRender, frame: u32) -> FarmRender {
+    fn of_frame(&self, render: &FarmRender, frame: i32) -> FarmRender {
         FarmRender { job: render.job.of_frame(frame), ..render.clone() }
     }
 
@@ -241,10 +241,10 @@ impl Studio for Here {
     fn after(
         &self,
         render: &FarmRender,
-        frame: u32,
-        first: &[(u32, PathBuf)],
+        frame: i32,
+        first: &[(i32, PathBuf)],
     ) -> Result<FarmRender, StudioError> {
-        let key = |(frame, folder): &(u32, PathBuf)| {
+        let key = |(frame, folder): &(i32, PathBuf)| {
             anyhow::Ok(KeyExposure { frame: *frame, exposure: exposure_of(folder)? })
         };
         let keys: Vec<KeyExposure> = first.iter().map(key).collect::<Result<_, _>>()?;

@@ -75,7 +75,7 @@ pub struct Ready {
 impl RenderJob {
     /// The job of a frame of a sequence.
     #[must_use]
-    pub fn of_frame(&self, frame: u32) -> Self {
+    pub fn of_frame(&self, frame: i32) -> Self {
         Self { source: self.source.of_frame(frame), ..self.clone() }
     }
 

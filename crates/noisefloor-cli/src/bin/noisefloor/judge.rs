@@ -17,7 +17,8 @@ use noisefloor_cli::say::note;
 use noisefloor_cli::sources::start_threads;
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
 use noisefloor_image::{
-    Plane, RenderLayers, SampleFacts, check_writable, read_facts, read_still_on, read_unread, write_exr,
+    Plane, ReadOptions, RenderLayers, SampleFacts, check_writable, read_facts, read_still_with, read_unread,
+    write_exr,
 };
 use report::Row;
 use std::num::NonZeroUsize;
@@ -29,6 +30,8 @@ pub struct JudgeJob {
     pub image: (PathBuf, Option<f64>),
     /// At least one, in the same way.
     pub against: Vec<(PathBuf, Option<f64>)>,
+    /// Of EXR files, if the user names one.
+    pub layer: Option<String>,
     /// If the user says so.
     pub samples: Option<Samples>,
     /// Of a model that goes by halves; with a map of visible noise if one is to be drawn.
@@ -66,7 +69,8 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
     for path in [&job.heat_map, &job.noise_map, &job.exr].into_iter().flatten() {
         check_writable(path)?;
     }
-    let read = |picture: &_| read(picture, &job.viewing);
+    let options = ReadOptions { viewing: job.viewing, layer: job.layer.clone(), ..ReadOptions::default() };
+    let read = |picture: &_| read(picture, &options);
     let image = read(&job.image)?;
     let others: Vec<Still> = job.against.iter().map(read).collect::<anyhow::Result<_>>()?;
     for (other, (path, _)) in others.iter().zip(&job.against) {
@@ -108,8 +112,8 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
 }
 
 /// A picture that can be judged; errors name it.
-fn read((path, spp): &(PathBuf, Option<f64>), viewing: &Viewing) -> anyhow::Result<Still> {
-    let still = read_still_on(path, *spp, viewing)?;
+fn read((path, spp): &(PathBuf, Option<f64>), options: &ReadOptions) -> anyhow::Result<Still> {
+    let still = read_still_with(path, *spp, options)?;
     if let (Some(typed), Some(said)) = (spp, read_facts(path)?.spp())
         && *typed != said as f64
     {
@@ -118,14 +122,14 @@ fn read((path, spp): &(PathBuf, Option<f64>), viewing: &Viewing) -> anyhow::Resu
             path.display()
         );
     }
-    warn_unread(path)?;
+    warn_unread(path, options)?;
     still.check().with_context(|| format!("{}", path.display()))?;
     Ok(still)
 }
 
 /// Says what is not read of a picture.
-pub(crate) fn warn_unread(path: &Path) -> anyhow::Result<()> {
-    for what in read_unread(path)?.warnings() {
+pub(crate) fn warn_unread(path: &Path, options: &ReadOptions) -> anyhow::Result<()> {
+    for what in read_unread(path, options)?.warnings() {
         note!("warning: {}: {what}", path.display());
     }
     Ok(())

@@ -5,7 +5,7 @@ use anyhow::{Context, anyhow, bail};
 use noisefloor::{Rgb, ToneMapping, Viewing, display::Display};
 use noisefloor_cli::say::{NotSaid, note, say};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
-use noisefloor_image::{Picture, check_writable, read_picture_on};
+use noisefloor_image::{Picture, ReadOptions, check_writable, read_picture_with};
 use noisefloor_rivals::DifferenceMap;
 use noisefloor_rivals::metrics::{MetricPair, MetricScores};
 use noisefloor_vision::Eotf;
@@ -24,6 +24,8 @@ const BYTES_A_PIXEL: usize = if cfg!(feature = "metrics") { 300 } else { 120 };
 pub struct MetricsJob {
     pub image: PathBuf,
     pub reference: PathBuf,
+    /// Of EXR files, if the user names one.
+    pub layer: Option<String>,
     pub viewing: Viewing,
     pub tone: ToneMapping,
     pub json: bool,
@@ -74,7 +76,8 @@ pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
     for path in [&job.map, &job.flip_map, &job.butteraugli_map].into_iter().flatten() {
         check_writable(path)?;
     }
-    let read = |path| read_picture_on(path, &job.viewing, MOST_PIXELS);
+    let options = ReadOptions { viewing: job.viewing, most_pixels: MOST_PIXELS, layer: job.layer.clone() };
+    let read = |path| read_picture_with(path, &options);
     let (image, reference) = (read(&job.image)?, read(&job.reference)?);
     let names = || format!("{} and {}", job.image.display(), job.reference.display());
     let size = image.size();
@@ -90,7 +93,7 @@ pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
         check_codes(job)?;
     }
     for path in [&job.image, &job.reference] {
-        warn_unread(path)?;
+        warn_unread(path, &options)?;
     }
     check_memory(size).with_context(names)?;
     let (image, reference) = (image.into_linear().pixels, reference.into_linear().pixels);

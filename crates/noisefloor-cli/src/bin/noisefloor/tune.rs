@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 pub struct TuneJob {
     pub source: SourceJob,
     /// The frames of a sequence that are looked at; none if it is one picture.
-    pub frames: Vec<u32>,
+    pub frames: Vec<i32>,
     /// Crops that are rendered after the first setting; 0 for the whole picture.
     pub regions: usize,
     pub resources: Resources,
@@ -70,7 +70,7 @@ struct Row {
     ratio: Option<f64>,
     /// The worst place, and the frame of a sequence that has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    frame: Option<u32>,
+    frame: Option<i32>,
     x: Option<usize>,
     y: Option<usize>,
     /// How many crops stood for the whole; 0 if it was judged itself.
@@ -98,7 +98,7 @@ struct Report {
     judged: String,
     /// The frames of a sequence, worst first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    frames: Vec<u32>,
+    frames: Vec<i32>,
     /// The crops, worst first: x, y, width and height.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     regions: Vec<[usize; 4]>,
@@ -163,7 +163,7 @@ impl<'a> Tune<'a> {
         let mut params = Params::default().with_viewing(job.viewing).with_tile(TILE);
         (params.tone_mapping, params.audience) = (job.tone.load()?, job.audience);
         let mut judges = Judges::begin(&job.criterion, params, job.resources.timeout)?;
-        let frames: Vec<Option<u32>> = match job.frames.as_slice() {
+        let frames: Vec<Option<i32>> = match job.frames.as_slice() {
             [] => vec![None],
             frames => frames.iter().copied().map(Some).collect(),
         };
@@ -200,7 +200,7 @@ impl<'a> Tune<'a> {
             }
             self.rows.push(row);
         }
-        let number = |frame: &u32| self.views.iter().position(|view| view.frame == Some(*frame));
+        let number = |frame: &i32| self.views.iter().position(|view| view.frame == Some(*frame));
         let hardest: Vec<usize> = kept.frames.iter().filter_map(number).collect();
         self.search = Search::new(tuning, self.views.len(), job.regions).ordered(&hardest);
         Ok(())
@@ -269,7 +269,7 @@ impl<'a> Tune<'a> {
     }
 
     /// Those of a sequence, worst first.
-    fn frames(&self) -> Vec<u32> {
+    fn frames(&self) -> Vec<i32> {
         self.search.views().iter().filter_map(|&view| self.views[view].frame).collect()
     }
 

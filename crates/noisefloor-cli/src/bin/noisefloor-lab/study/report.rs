@@ -4,6 +4,20 @@ use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_study::analysis::StudyReport;
 use noisefloor_study::analysis::tiles::LEAST_OBSERVERS;
 
+/// What of a tile an analysis says, and a rehearsal before it.
+pub(super) const COLUMNS: &str = "stack                tile    median      mean  95 % see none";
+pub(super) const WHAT_TRAIN_GETS: &str =
+    "median, mean and 95 % are over observers, in samples per pixel; `train` gets the mean";
+
+pub(super) fn say_levels(
+    stack: &str,
+    tile: usize,
+    [median, mean, level95]: [f64; 3],
+    more: &str,
+) -> Result<(), NotSaid> {
+    say!("{stack:20} {tile:4} {median:9.0} {mean:9.0} {level95:14.0}{more}")
+}
+
 pub(super) fn say_all(report: &StudyReport) -> Result<(), NotSaid> {
     let who = if report.simulated { "simulated observers" } else { "observers" };
     let finished = report.observers.iter().filter(|o| o.finished).count();
@@ -46,7 +60,7 @@ pub(super) fn say_all(report: &StudyReport) -> Result<(), NotSaid> {
 
 fn say_tiles(report: &StudyReport) -> Result<(), NotSaid> {
     if !report.tiles.is_empty() {
-        say!("stack                tile      mean  95 % see none   95 % interval")?;
+        say!("{COLUMNS}   95 % interval")?;
     }
     for t in &report.tiles {
         let interval = match t.level95_interval {
@@ -56,7 +70,11 @@ fn say_tiles(report: &StudyReport) -> Result<(), NotSaid> {
         let beyond = if t.beyond { "  beyond the stack" } else { "" };
         let doubt =
             if t.fit_probability.is_some_and(|p| p < 0.01) { "  the spread does not fit" } else { "" };
-        say!("{:20} {:4} {:9.0} {:14.0}   {interval}{beyond}{doubt}", t.stack, t.tile, t.mean, t.level95)?;
+        let levels = [t.median, t.mean, t.level95];
+        say_levels(&t.stack, t.tile, levels, &format!("   {interval}{beyond}{doubt}"))?;
+    }
+    if !report.tiles.is_empty() {
+        say!("{WHAT_TRAIN_GETS}")?;
     }
     Ok(())
 }

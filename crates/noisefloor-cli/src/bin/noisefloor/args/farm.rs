@@ -9,7 +9,7 @@ use clap::{Args, Subcommand};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::values;
 use noisefloor_cli::refuse;
-use noisefloor_farm::{FrameRange, Slurm};
+use noisefloor_farm::{Frames, Slurm};
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -85,11 +85,11 @@ struct MergeArgs {
 struct PlanArgs {
     /// Folder of the farm, on a file system that all machines share.
     dir: PathBuf,
-    /// First and last frame. {frame} in the name of the scene, or {frame:04} for four digits, is the number
-    /// of the frame. Each frame has a seed of its own. All have the exposure of the first, for which they
+    /// Frames, as for `noisefloor render`: 1-240, 1-100x5, 1,5,9 or -3--1. {frame} in the name of the scene, or
+    /// {frame:04} for four digits, is the number of the frame (####, %04d and $F4, too). Each frame has a seed of its own. All have the exposure of the first, for which they
     /// wait; after `--`, --exposure-from or --exposure give another.
-    #[arg(long, value_name = "A-B")]
-    frames: Option<FrameRange>,
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    frames: Option<Frames>,
     /// Most tasks of a round over all frames, up to 1000; short rounds have fewer.
     #[arg(long, default_value = "16", value_name = "N", value_parser = tasks)]
     tasks: usize,
@@ -155,7 +155,7 @@ impl FarmArgs {
     pub fn check(self) -> anyhow::Result<FarmTask> {
         Ok(match self.command {
             FarmCommand::Plan(PlanArgs { dir, frames, tasks, keep_shards: keep, render }) => {
-                let render = if render.is_empty() { None } else { Some(renders(render, frames)?) };
+                let render = if render.is_empty() { None } else { Some(renders(render, frames.as_ref())?) };
                 FarmTask::Plan(Box::new(PlanTask { dir, frames, tasks, keep, render }))
             }
             FarmCommand::Run(RunArgs { dir, local, sbatch, wait, every, quiet }) => {
@@ -177,10 +177,7 @@ impl FarmArgs {
 }
 
 /// The render that follows `--`. Other machines know neither the current folder nor the file of --config.
-fn renders(
-    typed: Vec<OsString>,
-    frames: Option<FrameRange>,
-) -> anyhow::Result<(FarmRender, SequenceExposure)> {
+fn renders(typed: Vec<OsString>, frames: Option<&Frames>) -> anyhow::Result<(FarmRender, SequenceExposure)> {
     let words = ["noisefloor".into(), "render".into()].into_iter().chain(typed);
     let cli = Cli::parsed(expand(words.collect())?);
     let cli = cli.map_err(|error| anyhow::anyhow!("after `--`: {error}"))?;
@@ -192,7 +189,7 @@ fn renders(
         Some(frames) => args.check_of(frames)?,
         None => (args.check()?, SequenceExposure::Each),
     };
-    let absent = |frame: &&u32| frames.is_some_and(|frames| !frames.contains(**frame));
+    let absent = |frame: &&i32| frames.is_some_and(|frames| !frames.contains(**frame));
     if let Some(frame) = exposure.frames().iter().find(absent) {
         refuse!(
             "--exposure-from: frame {frame} is not among the frames of the farm; render it first, and give \

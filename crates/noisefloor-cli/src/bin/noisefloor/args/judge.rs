@@ -8,6 +8,7 @@ use noisefloor::{
     tile::DEFAULT_TILE,
 };
 use noisefloor_cli::options::eyes::EyesArgs;
+use noisefloor_cli::options::layer::LayerArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::tone::ToneArgs;
 use noisefloor_cli::options::values;
@@ -32,7 +33,7 @@ use std::path::PathBuf;
 /// been asked about denoised tiles: the limit is the vision model's.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  noisefloor judge a.exr --spp 256 --against b.exr --spp 256       two independent renderings
+  noisefloor judge a.exr b.exr --spp 256 --spp 256                 two independent renderings
   noisefloor judge out/a/image.exr --against out/b/image.exr       of `render`: the files say the rest
   noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --noise-map noise.png
@@ -44,11 +45,16 @@ pub struct JudgeArgs {
     image: PathBuf,
     /// Samples per pixel: first of IMAGE, then of each --against, in their order [default: what the EXR
     /// files say, as those of `render --criterion spp:N` and of pbrt do].
-    #[arg(long, value_name = "N")]
+    #[arg(long, alias = "samples", value_name = "N")]
     spp: Vec<f64>,
+    /// The same as --against.
+    #[arg(value_name = "AGAINST")]
+    others: Vec<PathBuf>,
     /// Another rendering of the same view. Repeat for more.
-    #[arg(long, required = true, value_name = "IMAGE")]
+    #[arg(long, required_unless_present = "others", value_name = "IMAGE")]
     against: Vec<PathBuf>,
+    #[command(flatten)]
+    layer: LayerArgs,
     /// The pictures are snapshots of one progressive rendering: the later one contains the samples of the
     /// earlier one.
     #[arg(long)]
@@ -94,7 +100,9 @@ pub struct JudgeArgs {
 }
 
 impl JudgeArgs {
-    pub fn check(self) -> anyhow::Result<Question> {
+    pub fn check(mut self) -> anyhow::Result<Question> {
+        // In the order in which --spp counts them
+        self.against.splice(..0, std::mem::take(&mut self.others));
         match <[PathBuf; 2]>::try_from(self.denoised.clone()) {
             Ok(denoised) => self.check_denoised(denoised).map(|job| Question::Denoised(Box::new(job))),
             Err(_) => self.check_noise().map(|job| Question::Noise(Box::new(job))),
@@ -113,6 +121,7 @@ impl JudgeArgs {
             other => refuse!("--spp is needed once for each picture: {} given for 2 pictures", other.len()),
         };
         Ok(DenoisedJob {
+            layer: self.layer.layer,
             noisy: [(self.image, spp[0]), (against, spp[1])],
             denoised,
             samples: self.independent.then_some(Samples::Independent),
@@ -166,6 +175,7 @@ impl JudgeArgs {
         let image = (self.image, counts.next().flatten());
         let against = self.against.into_iter().zip(counts).collect();
         Ok(JudgeJob {
+            layer: self.layer.layer,
             image,
             against,
             samples,

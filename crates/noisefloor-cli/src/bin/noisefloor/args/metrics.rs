@@ -2,6 +2,7 @@
 
 use crate::metrics::MetricsJob;
 use clap::Args;
+use noisefloor_cli::options::layer::LayerArgs;
 use noisefloor_cli::options::tone::ToneArgs;
 use noisefloor_cli::options::viewing::ViewingArgs;
 use noisefloor_cli::refuse;
@@ -39,6 +40,8 @@ pub struct MetricsArgs {
     #[arg(value_name = "REFERENCE")]
     reference: PathBuf,
     #[command(flatten)]
+    layer: LayerArgs,
+    #[command(flatten)]
     viewing: ViewingArgs,
     #[command(flatten)]
     tone: ToneArgs,
@@ -64,6 +67,7 @@ impl MetricsArgs {
         Ok(MetricsJob {
             image: self.image,
             reference: self.reference,
+            layer: self.layer.layer,
             viewing: self.viewing.or_default(),
             tone: self.tone.check()?.load()?,
             json: self.json,

@@ -18,7 +18,7 @@ use noisefloor_cli::say::note;
 use noisefloor_cli::sources::SourceJob;
 use noisefloor_cli::spell::JobPath;
 use noisefloor_eyes::Person;
-use noisefloor_farm::FrameRange;
+use noisefloor_farm::Frames;
 use std::convert::Infallible;
 use std::ffi::OsString;
 use std::net::SocketAddr;
@@ -91,12 +91,14 @@ pub struct RenderArgs {
     /// No progress bar and no summary.
     #[arg(long, short)]
     quiet: bool,
-    /// Render a sequence: SCENE holds {frame}, or {frame:04} for four digits, in place of the number; so
-    /// may --against and values of --define. Each frame goes into a folder of its own, and frames.csv sums
+    /// Render a sequence: frames 1-240, every fifth by 1-100x5, a list as in 1,5,9-12, or -3--1. SCENE holds {frame},
+    /// or {frame:04} for four digits, in place of the number (####, %04d and $F4 do, too); so may --against. One file
+    /// can hold all frames: {frame} then stands in a value of --define, and a .blend file with --source cycles needs
+    /// none. Each frame goes into a folder of its own, and frames.csv sums
     /// up. --resume goes on where the sequence was interrupted. Each frame has a seed of its own, and all have
     /// one exposure (--exposure-from). With --fps, they are judged as frames of a film.
-    #[arg(long, value_name = "FIRST-LAST")]
-    frames: Option<FrameRange>,
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    frames: Option<Frames>,
     /// Render only this many frames of --frames, at equal distances, and say what all of them will take:
     /// samples per pixel and time, with a range, into forecast.json. The frames are kept: without this
     /// option, --resume goes on from them [default: 5].
@@ -121,7 +123,7 @@ pub struct RenderArgs {
     /// 30, or as many as keep all refreshes within 2 % of the time].
     #[arg(long, value_name = "SECONDS", value_parser = autosave)]
     autosave: Option<Autosave>,
-    #[arg(long, hide = true, value_parser = no_spp)]
+    #[arg(long, alias = "samples", hide = true, value_parser = no_spp)]
     spp: Option<String>,
     #[command(flatten, next_help_heading = "Renderer")]
     renderer: RendererArgs,
@@ -135,7 +137,13 @@ pub struct RenderArgs {
     /// frame that is rendered; the number of another one, or of several, as in 1,60,120, between which it is
     /// eased; the output folder of another render; or `each`, from every frame by itself [default: first].
     /// --exposure gives it as a number.
-    #[arg(long, value_name = "WHERE", help_heading = "What people see", conflicts_with = "exposure")]
+    #[arg(
+        long,
+        value_name = "WHERE",
+        help_heading = "What people see",
+        conflicts_with = "exposure",
+        allow_hyphen_values = true
+    )]
     exposure_from: Option<ExposureFrom>,
     #[command(flatten, next_help_heading = "What people see")]
     viewing: ViewingArgs,
@@ -202,7 +210,7 @@ const DRAFT_LOST: f64 = 0.9;
 #[derive(Clone, Debug, PartialEq)]
 enum ExposureFrom {
     First,
-    Frames(Vec<u32>),
+    Frames(Vec<i32>),
     Render(PathBuf),
     Each,
 }
@@ -211,7 +219,7 @@ impl FromStr for ExposureFrom {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        let frames: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+        let frames: Result<Vec<i32>, _> = text.split(',').map(str::parse).collect();
         Ok(match (text, frames) {
             ("first", _) => Self::First,
             ("each", _) => Self::Each,
@@ -339,7 +347,7 @@ impl RenderArgs {
     }
 
     /// A render of which these are frames, and where their exposure comes from.
-    pub fn check_of(self, frames: FrameRange) -> anyhow::Result<(RenderRun, SequenceExposure)> {
+    pub fn check_of(self, frames: &Frames) -> anyhow::Result<(RenderRun, SequenceExposure)> {
         let from = self.exposure_from.clone().unwrap_or(ExposureFrom::First);
         let typed = self.exposure_from.is_some();
         let run = self.check_one()?;
@@ -355,10 +363,10 @@ impl RenderArgs {
     }
 
     /// Frames that can begin.
-    pub fn check_frames(self) -> anyhow::Result<SequenceRun> {
-        let Some(frames) = self.frames else { refuse!("--frames is missing") };
+    pub fn check_frames(mut self) -> anyhow::Result<SequenceRun> {
+        let Some(frames) = self.frames.take() else { refuse!("--frames is missing") };
         let forecast = self.forecast;
-        let (run, exposure) = self.check_of(frames)?;
+        let (run, exposure) = self.check_of(&frames)?;
         let before = run.job.source.check_frames()?;
         let out = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(stem(&before)), PathBuf::from);
         Ok(SequenceRun { frames, out, run, exposure, forecast })

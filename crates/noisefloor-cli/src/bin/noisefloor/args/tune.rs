@@ -16,6 +16,7 @@ use noisefloor_cli::options::viewing::{ViewingArgs, judged_by};
 use noisefloor_cli::refuse;
 use noisefloor_cli::sources::SourceKind;
 use noisefloor_denoise::DEFAULT_JODS_LOST;
+use noisefloor_farm::Frames;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -56,6 +57,8 @@ pub struct TuneArgs {
     /// Where it ends: the finest threshold, or the most samples [default: 0.001, or 16384].
     #[arg(long, value_name = "SETTING")]
     to: Option<f64>,
+    #[arg(long, alias = "samples", hide = true, value_parser = no_spp)]
+    spp: Option<String>,
     /// With a threshold: the most samples per pixel of one picture, whatever the threshold [default: what
     /// Blender's scene says; for LuxCore and programs 16384].
     #[arg(long, value_name = "SPP")]
@@ -76,10 +79,11 @@ pub struct TuneArgs {
     /// With --keep: overwrite what is in the folder.
     #[arg(long, requires = "keep")]
     force: bool,
-    /// Find one setting for a sequence by these of its frames: SCENE holds {frame}, or {frame:04} for four digits.
+    /// Find one setting for a sequence by these of its frames, as in 1,60,120 or 1-240x60: SCENE holds {frame}, or {frame:04} for
+    /// four digits, as for `render`.
     /// All are rendered with the first setting, then the worst first, until one fails.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    frames: Vec<u32>,
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    frames: Option<Frames>,
     /// Render the whole picture only with the first setting and in the end, and in between this many crops of 128 pixels around
     /// what was worst: for large pictures.
     #[arg(long, value_name = "COUNT", conflicts_with = "keep", value_parser = clap::value_parser!(u64).range(1..=64))]
@@ -106,18 +110,21 @@ pub struct TuneArgs {
     eyes: EyesArgs,
 }
 
+/// `tune --spp 100` is what people try first.
+fn no_spp(text: &str) -> Result<String, String> {
+    Err(format!(
+        "`tune` finds how many samples are needed: --knob samples looks for their number, up to --to {text}, and \
+         --max-spp {text} bounds a picture with a threshold. `render --criterion spp:{text}` takes {text} everywhere"
+    ))
+}
+
 impl TuneArgs {
     pub fn check(self) -> anyhow::Result<TuneJob> {
         let tone = self.tone.check()?;
         tone.load()?;
         let (source, resources) = self.renderer.check(self.scene.as_deref())?;
-        if !self.frames.is_empty() {
+        if self.frames.is_some() {
             source.check_frames()?;
-            let mut twice = self.frames.clone();
-            twice.sort_unstable();
-            if let Some(pair) = twice.windows(2).find(|pair| pair[0] == pair[1]) {
-                refuse!("--frames names frame {} twice", pair[0]);
-            }
         }
         let (coarsest, name) = match &source.kind {
             SourceKind::Adapter(adapter) => (adapter.threshold, adapter.name),
@@ -210,7 +217,7 @@ impl TuneArgs {
         }
         Ok(TuneJob {
             source,
-            frames: self.frames,
+            frames: self.frames.iter().flat_map(Frames::iter).collect(),
             regions: self.regions.unwrap_or(0) as usize,
             resources,
             tuning,

@@ -9,8 +9,8 @@ use noisefloor::{
 };
 use noisefloor_cli::say::{note, say, say_json};
 use noisefloor_denoise::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY};
-use noisefloor_image::check_writable;
 use noisefloor_image::maps::{Canvas, draw_field};
+use noisefloor_image::{ReadOptions, check_writable};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -21,6 +21,8 @@ pub struct DenoisedJob {
     /// With their samples per pixel; without them, the files say how many.
     pub noisy: [(PathBuf, Option<f64>); 2],
     pub denoised: [PathBuf; 2],
+    /// Of the noisy EXR files, if the user names one.
+    pub layer: Option<String>,
     /// If the user says so.
     pub samples: Option<Samples>,
     /// JODs that a tile may lose.
@@ -55,7 +57,8 @@ struct Report<'a> {
 
 pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
     job.noise_map.iter().try_for_each(check_writable)?;
-    let [a, b] = [read(&job.noisy[0], &job.viewing)?, read(&job.noisy[1], &job.viewing)?];
+    let options = ReadOptions { viewing: job.viewing, layer: job.layer.clone(), ..ReadOptions::default() };
+    let [a, b] = [read(&job.noisy[0], &options)?, read(&job.noisy[1], &options)?];
     let denoised = |path, of| denoised(path, of, &job.viewing);
     let [da, db] = [denoised(&job.denoised[0], &a)?, denoised(&job.denoised[1], &b)?];
     if da == db {
@@ -96,7 +99,8 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
 
 /// What a denoiser has made of a picture.
 fn denoised(path: &Path, of: &Still, viewing: &Viewing) -> anyhow::Result<Vec<Rgb>> {
-    let still = read(&(path.to_owned(), Some(of.spp)), viewing)?;
+    let options = ReadOptions { viewing: *viewing, ..ReadOptions::default() };
+    let still = read(&(path.to_owned(), Some(of.spp)), &options)?;
     of.fits(&still)
         .with_context(|| format!("{} beside the picture that it was made from", path.display()))?;
     Ok(still.pixels)

@@ -62,9 +62,9 @@ pub(super) fn say_all(
 }
 
 fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
-    say!(
-        "tile     x     y   size       P  verdict      stops at spp  people stop seeing noise at spp (80 %)"
-    )?;
+    // Both in the same words: where so many people see none any more
+    let stop = format!("{} see none at spp", report.people);
+    say!("tile     x     y   size       P  verdict    {stop:>24}  10…90 % see none at spp")?;
     for row in report.tiles {
         let verdict = match row {
             Row { unlike: true, .. } => "not judged",
@@ -75,7 +75,7 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
         let size = format!("{}×{}", row.width, row.height);
         let range = row.threshold.map_or(String::new(), |t| format!("{}…{}", t.low, t.high));
         say!(
-            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>14}  {range:>16}{}",
+            "{:4} {:5} {:5} {size:>8} {:6.3}  {verdict:10} {expected:>24}  {range:>23}{}",
             row.tile,
             row.x,
             row.y,

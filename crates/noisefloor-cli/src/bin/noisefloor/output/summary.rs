@@ -69,7 +69,8 @@ impl Output {
         }
         if let Some(threshold) = typical_threshold(session) {
             say!(
-                "in the typical tile, people stop seeing noise between {} and {} samples per pixel (80 % of them)",
+                "in the typical tile, 10 % of people see no noise from {} samples per pixel on, 90 % from {}; tiles stop \
+                 where --people of them do",
                 threshold.low,
                 threshold.high
             )?;

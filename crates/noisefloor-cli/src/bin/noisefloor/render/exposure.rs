@@ -14,14 +14,14 @@ pub enum SequenceExposure {
     /// Each what it settles on, or all a given one.
     Each,
     /// From these frames, in ascending order; whether the user has named them.
-    Of(Vec<u32>, bool),
+    Of(Vec<i32>, bool),
 }
 
 /// One frame of exposure.json: what a sequence keeps, so that frames which are rendered later, or elsewhere,
 /// have the same exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeyExposure {
-    pub frame: u32,
+    pub frame: i32,
     pub exposure: f32,
 }
 
@@ -30,13 +30,14 @@ const KEPT: &str = "exposure.json";
 /// The exposure of a frame by key frames in ascending order; none of a key frame, which settles its own, or
 /// without any. Between two it changes by the same factor from frame to frame, as equal steps look equal;
 /// outside it stays.
-pub fn eased(keys: &[KeyExposure], frame: u32) -> Option<f32> {
+pub fn eased(keys: &[KeyExposure], frame: i32) -> Option<f32> {
     let next = keys.partition_point(|key| key.frame < frame);
     let before = next.checked_sub(1).map(|index| keys[index]);
     match (before, keys.get(next)) {
         (_, Some(key)) if key.frame == frame => None,
         (Some(before), Some(after)) => {
-            let way = f64::from(frame - before.frame) / f64::from(after.frame - before.frame);
+            let since = |frame: i32| f64::from(frame) - f64::from(before.frame);
+            let way = since(frame) / since(after.frame);
             let [from, to] = [before, *after].map(|key| f64::from(key.exposure).ln());
             Some((from + way * (to - from)).exp() as f32)
         }
@@ -47,7 +48,7 @@ pub fn eased(keys: &[KeyExposure], frame: u32) -> Option<f32> {
 
 impl SequenceExposure {
     /// The frames whose exposures the others have.
-    pub fn frames(&self) -> &[u32] {
+    pub fn frames(&self) -> &[i32] {
         match self {
             Self::Each => &[],
             Self::Of(frames, _) => frames,

@@ -4,7 +4,7 @@ use super::frame_report::FrameRow;
 use indicatif::FormattedDuration;
 use noisefloor_cli::files::write_json;
 use noisefloor_cli::say;
-use noisefloor_farm::{Forecast, FrameRange};
+use noisefloor_farm::{Forecast, Frames};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Duration;
@@ -13,11 +13,11 @@ const FILE: &str = "forecast.json";
 
 /// forecast.json.
 #[derive(Serialize)]
-struct Forecasts {
-    /// First and last frame.
-    frames: FrameRange,
+struct Forecasts<'a> {
+    /// All frames, as they are typed.
+    frames: &'a Frames,
     /// Those that it is made of; frames.csv says what they took.
-    known: Vec<u32>,
+    known: Vec<i32>,
     /// Samples per pixel, on average over all pixels of all frames.
     spp: Span,
     /// Of all frames together, one after another on this machine.
@@ -40,7 +40,7 @@ impl Span {
 }
 
 /// Writes what the sequence will take, and says it.
-pub(super) fn say(frames: FrameRange, out: &Path, rows: &[FrameRow], quiet: bool) -> anyhow::Result<()> {
+pub(super) fn say(frames: &Frames, out: &Path, rows: &[FrameRow], quiet: bool) -> anyhow::Result<()> {
     let forecast = |value: fn(&FrameRow) -> f64| {
         let known: Vec<_> = rows.iter().map(|row| (row.frame, value(row))).collect();
         Forecast::of(frames, &known)
@@ -48,7 +48,7 @@ pub(super) fn say(frames: FrameRange, out: &Path, rows: &[FrameRow], quiet: bool
     let sums = forecast(|row| row.spp).zip(forecast(|row| row.seconds));
     let (spp, seconds) =
         sums.ok_or_else(|| anyhow::anyhow!("too few frames were rendered for a forecast"))?;
-    let known: Vec<u32> = rows.iter().map(|row| row.frame).collect();
+    let known: Vec<i32> = rows.iter().map(|row| row.frame).collect();
     let (spp, seconds) = (Span::of(spp, 1.0 / frames.count() as f64), Span::of(seconds, 1.0));
     let forecasts = Forecasts { frames, known, spp, seconds };
     write_json(&out.join(FILE), &forecasts)?;

@@ -8,7 +8,7 @@ use std::path::Path;
 /// One line of frames.csv.
 #[derive(Serialize)]
 pub(super) struct FrameRow {
-    pub(super) frame: u32,
+    pub(super) frame: i32,
     /// Whether every tile has what it should have.
     pub(super) complete: bool,
     /// Samples per pixel, on average.
@@ -38,7 +38,7 @@ pub(super) fn read(out: &Path) -> Option<FrameReport> {
     serde_json::from_reader(BufReader::new(File::open(out.join("report.json")).ok()?)).ok()
 }
 
-pub(super) fn row(frame: u32, report: &FrameReport) -> FrameRow {
+pub(super) fn row(frame: i32, report: &FrameReport) -> FrameRow {
     let spp = report.samples as f64 / (report.width * report.height).max(1) as f64;
     let this_run = report.seconds_setup.unwrap_or(0.0) + report.seconds_total.unwrap_or(0.0);
     let seconds = report.seconds_before + this_run;

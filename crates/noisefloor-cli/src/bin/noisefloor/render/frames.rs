@@ -11,7 +11,7 @@ use indicatif::HumanDuration;
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::signals::{self, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::{note, say};
-use noisefloor_farm::FrameRange;
+use noisefloor_farm::Frames;
 use noisefloor_image::write_csv;
 use std::fs;
 use std::io::Write;
@@ -21,9 +21,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// A sequence to render: checked. {frame} stands for the frame in the names of its run.
+/// A sequence to render: checked. Names and values of its run say where the number of the frame stands.
 pub struct SequenceRun {
-    pub frames: FrameRange,
+    pub frames: Frames,
     pub out: PathBuf,
     pub run: RenderRun,
     pub exposure: SequenceExposure,
@@ -34,8 +34,8 @@ pub struct SequenceRun {
 impl SequenceRun {
     /// The run of one frame, in a folder of its own; with the exposure that it has by the key frames, unless
     /// it is one of them.
-    fn of_frame(&self, frame: u32, keys: &[KeyExposure]) -> RenderRun {
-        let out = self.out.join(FrameRange::folder(frame));
+    fn of_frame(&self, frame: i32, keys: &[KeyExposure]) -> RenderRun {
+        let out = self.out.join(Frames::folder(frame));
         let against = self.run.against.as_ref().map(|against| against.of_frame(frame));
         let mut job = self.run.job.of_frame(frame);
         if let Some(exposure) = eased(keys, frame) {
@@ -69,15 +69,15 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
     let mut keys = exposure.kept(out, run.earlier)?;
     // The frames whose exposures the others have come first
     let key_frames = if keys.is_empty() { exposure.frames() } else { &[] };
-    let wanted: Vec<u32> = match forecast {
+    let wanted: Vec<i32> = match forecast {
         Some(few) => frames.spread(*few),
         None => frames.iter().collect(),
     };
-    let others: Vec<u32> = wanted.into_iter().filter(|frame| !key_frames.contains(frame)).collect();
+    let others: Vec<i32> = wanted.into_iter().filter(|frame| !key_frames.contains(frame)).collect();
     let keys_within = key_frames.iter().filter(|frame| frames.contains(**frame)).count();
     let mut found = Vec::new();
     for (index, &frame) in key_frames.iter().chain(&others).enumerate() {
-        let folder = out.join(FrameRange::folder(frame));
+        let folder = out.join(Frames::folder(frame));
         // Whether that is this frame, its own process knows: it reads the scene
         let done = run.earlier == Earlier::Resume && read(&folder).is_some_and(|report| report.complete);
         let status = elsewhere(&sequence.of_frame(frame, &keys)).with_context(|| format!("frame {frame}"))?;
@@ -118,7 +118,7 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
         }
     }
     match forecast {
-        Some(_) => forecast::say(*frames, out, &rows, run.quiet)?,
+        Some(_) => forecast::say(frames, out, &rows, run.quiet)?,
         None if !run.quiet => sum_up(out, &rows)?,
         None => {}
     }

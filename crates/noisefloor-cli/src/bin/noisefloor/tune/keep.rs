@@ -25,7 +25,7 @@ pub struct Keep(Folder);
 pub struct KeptSearch {
     identity: Vec<SourceIdentity>,
     #[serde(default)]
-    pub frames: Vec<u32>,
+    pub frames: Vec<i32>,
     pub steps: Vec<Row>,
 }
 

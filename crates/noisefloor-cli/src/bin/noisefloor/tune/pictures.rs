@@ -76,7 +76,7 @@ pub struct Judged {
 
 /// One picture that is rendered again and again: the only one, or a frame of a sequence.
 pub struct View {
-    pub frame: Option<u32>,
+    pub frame: Option<i32>,
     /// What it is rendered from.
     source: SourceJob,
     pub pictures: Pictures,
@@ -85,7 +85,7 @@ pub struct View {
 }
 
 impl View {
-    pub fn open(job: &TuneJob, frame: Option<u32>, judges: &mut Judges<'_>) -> anyhow::Result<Self> {
+    pub fn open(job: &TuneJob, frame: Option<i32>, judges: &mut Judges<'_>) -> anyhow::Result<Self> {
         let source = frame.map_or_else(|| job.source.clone(), |frame| job.source.of_frame(frame));
         let mut pictures = Pictures::open(&source, job.resources, job.tuning.knob(), job.most_spp)?;
         let guides = match &mut judges.denoiser {
