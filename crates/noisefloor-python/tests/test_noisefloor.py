@@ -588,6 +588,54 @@ class Denoised(unittest.TestCase):
         with self.assertRaisesRegex(nf.ParameterError, "denoiser"):
             nf.Session(96, 64, first_hits=hits)
 
+    def test_the_mean_of_mirror_images_is_symmetric(self):
+        def smear(radiance, albedo=None, normal=None):
+            made = radiance.copy()
+            for x in range(1, made.shape[1]):
+                made[:, x] = 0.5 * (made[:, x] + made[:, x - 1])
+            return made if albedo is None else made + albedo - normal
+
+        picture = np.random.default_rng(5).uniform(0, 1, (24, 40, 3)).astype(np.float32)
+        made = nf.mirror_mean(smear, picture)
+        expected = 0.5 * (smear(picture) + smear(picture[:, ::-1])[:, ::-1])
+        np.testing.assert_allclose(made, expected, atol=1e-6)
+        np.testing.assert_allclose(nf.mirror_mean(smear, picture[:, ::-1]), made[:, ::-1], atol=1e-6)
+        self.assertGreater(abs(smear(picture[:, ::-1]) - smear(picture)[:, ::-1]).max(), 0.1)
+        np.testing.assert_array_equal(nf.mirror_mean(smear, picture, passes=1), smear(picture))
+        turned = nf.mirror_mean(smear, picture.transpose(1, 0, 2), passes=8)
+        np.testing.assert_allclose(turned.transpose(1, 0, 2), nf.mirror_mean(smear, picture, passes=8), atol=1e-6)
+        # Albedo and normals are mirrored with the picture
+        guided = nf.mirror_mean(smear, picture, picture, np.zeros_like(picture))
+        np.testing.assert_allclose(guided, made + picture, atol=1e-6)
+
+        def fails(radiance):
+            raise KeyError("out of order")
+
+        for options, error in (
+            (dict(denoiser=smear, radiance=picture, passes=3), nf.ParameterError),
+            (dict(denoiser=smear, radiance=picture, albedo=picture), nf.ParameterError),
+            (dict(denoiser=smear, radiance=picture, albedo=picture, normal=picture[1:]), nf.SizeError),
+            (dict(denoiser=lambda radiance: radiance[1:], radiance=picture), nf.SizeError),
+            (dict(denoiser=fails, radiance=picture), KeyError),
+            (dict(denoiser=3, radiance=picture), nf.ParameterError),
+        ):
+            with self.assertRaises(error):
+                nf.mirror_mean(**options)
+        # A session is told, and remembers where it goes
+        session = self.session(smooth, passes=4)
+        pickle.loads(pickle.dumps(session))
+        with self.assertRaisesRegex(nf.ParameterError, "1, 4 or 8"):
+            self.session(smooth, passes=2)
+
+    def test_first_hits_are_clean_where_halves_agree(self):
+        noise = np.random.default_rng(6)
+        flat = np.full((64, 96, 3), 0.5, np.float32)
+        half = lambda deviation: [flat + noise.normal(0, deviation, flat.shape).astype(np.float32)] * 2
+        self.assertTrue(nf.first_hits_are_clean([half(0.01), half(0.01)]))
+        self.assertFalse(nf.first_hits_are_clean([half(0.03), half(0.03)]))
+        with self.assertRaises(nf.SizeError):
+            nf.first_hits_are_clean([[flat, flat], [flat, flat[1:]]])
+
     def test_what_a_denoiser_does_wrong_is_said(self):
         def fails(radiance):
             raise KeyError("no weights")
