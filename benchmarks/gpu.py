@@ -18,6 +18,9 @@ import numpy as np
 
 import noisefloor
 
+# Samples of each pixel in one call.
+AT_ONCE = 4
+
 # A room of two walls, a floor and a ball under a lamp and a sky: as little work for each sample as a path tracer can
 # have, so that the oracle has the least time.
 KERNEL = r"""
@@ -96,10 +99,11 @@ def renderer(kind, width, height):
     else:
         scene = mitsuba.load_file(kind, resx=width, resy=height)
     def render(spp, seed):
-        image = mitsuba.render(scene, spp=spp, seed=seed)[:, :, :3]
+        return mitsuba.render(scene, spp=spp, seed=seed)[:, :, :3]
+    def evaluate(image):
         drjit.eval(image)
         drjit.sync_thread()
-        return image
+    render.evaluate = evaluate
     return render
 
 
@@ -108,32 +112,56 @@ def session(width, height, tile, limit):
     return noisefloor.Session(width, height, params=params)
 
 
-def alone(render, passes):
-    start = time.perf_counter()
-    for seed, spp in enumerate(passes):
-        render(spp, seed)
+class Sums:
+    """What a renderer sums up on the device, `AT_ONCE` samples of each pixel a call."""
+
+    def __init__(self, render):
+        self.render, self.calls, self.spp, self.sum = render, 0, 0, None
+
+    def add(self):
+        self.calls += 1
+        mean = self.render(AT_ONCE, self.calls)
+        # A copy: the renderer fills the same array again
+        self.sum = mean * AT_ONCE if self.sum is None else self.sum + mean * AT_ONCE
+        self.spp += AT_ONCE
+        if hasattr(self.render, "evaluate"):
+            self.render.evaluate(self.sum)
+
+    def take(self):
+        spp, mean = self.spp, self.sum / self.spp
+        self.spp, self.sum = 0, None
+        return spp, mean
+
+
+def alone(render, calls):
+    sums, start = Sums(render), time.perf_counter()
+    for _ in range(calls):
+        sums.add()
+    np.asarray(sums.sum.get() if hasattr(sums.sum, "get") else sums.sum)
     return time.perf_counter() - start
 
 
 def waiting(render, judged):
-    """Wall time until the stop, and the samples of the passes."""
-    passes, start = [], time.perf_counter()
+    """Wall time until the stop, and the calls of the renderer."""
+    sums, start = Sums(render), time.perf_counter()
     while not judged.done:
-        passes.append(judged.next_pass)
-        judged.push_image(passes[-1], render(passes[-1], len(passes)))
-        judged.judge()
-    return time.perf_counter() - start, passes
+        sums.add()
+        if sums.spp >= judged.next_pass:
+            judged.push_image(*sums.take())
+            judged.judge()
+    return time.perf_counter() - start, sums.calls
 
 
 def background(render, judged):
-    passes, start = [], time.perf_counter()
-    with noisefloor.Background(judged) as beside:
+    sums, start = Sums(render), time.perf_counter()
+    with noisefloor.Background(judged, waiting=1) as beside:
         while not beside.done:
-            passes.append(beside.next_pass)
-            beside.push_image(passes[-1], render(passes[-1], len(passes)))
-            beside.judge()
+            sums.add()
+            if sums.spp >= (beside.next_pass or 0) and not beside.pending:
+                beside.push_image(*sums.take())
+                beside.judge()
         stopped = time.perf_counter() - start
-    return stopped, passes
+    return stopped, sums.calls
 
 
 def main():
@@ -155,14 +183,14 @@ def main():
         for size in options.sizes.split(","):
             width, height = map(int, size.split("x"))
             render = renderer(kind, width, height)
-            render(16, 10**6)  # compiles
+            render(AT_ONCE, 10**6)  # compiles
             new = lambda: session(width, height, options.tile, options.limit)
-            waited, passes = waiting(render, new())
+            waited, calls = waiting(render, new())
             beside, more = background(render, new())
             # Each beside as many samples without an oracle
-            plain, as_many = alone(render, passes), alone(render, more)
+            plain, as_many = alone(render, calls), alone(render, more)
             print(f"| {kind} | {size} | {plain:.2f} s | {waited:.2f} s | {beside:.2f} s | ×{waited / plain:.2f} "
-                  f"| ×{beside / as_many:.2f} | {100 * (sum(more) / sum(passes) - 1):.1f} % |", flush=True)
+                  f"| ×{beside / as_many:.2f} | {100 * (more / calls - 1):.1f} % |", flush=True)
 
 
 if __name__ == "__main__":

@@ -222,6 +222,8 @@ typedef struct {
 typedef struct {
     // Passes that were judged.
     uint64_t judged;
+    // Passes that were handed over and are not judged yet.
+    size_t pending;
     // Samples per pixel that the next pass over the whole picture should have; 0 when all tiles are done.
     uint64_t next_pass;
     // Open tiles, after the last pass that was judged.

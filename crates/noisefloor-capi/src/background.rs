@@ -39,6 +39,8 @@ impl handle::Handle for NfBackground {
 pub struct NfBackgroundState {
     /// Passes that were judged.
     pub judged: u64,
+    /// Passes that were handed over and are not judged yet.
+    pub pending: usize,
     /// Samples per pixel that the next pass over the whole picture should have; 0 when all tiles are done.
     pub next_pass: u64,
     /// Open tiles, after the last pass that was judged.
@@ -164,6 +166,7 @@ pub unsafe extern "C" fn nf_background_state(
         let Heard { judged, stopped, warnings } = lent.hear(lent.background.news()?);
         let found = NfBackgroundState {
             judged,
+            pending: lent.background.pending(),
             next_pass: lent.background.next_pass().unwrap_or(0),
             open_tiles: lent.background.requests().len(),
             stops: stopped,

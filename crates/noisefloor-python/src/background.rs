@@ -127,6 +127,12 @@ impl PyBackground {
         Ok(self.session.clone_ref(py))
     }
 
+    /// Passes that were handed over and are not judged yet. Does not wait.
+    #[getter]
+    fn pending(&self) -> PyResult<usize> {
+        Ok(self.here()?.pending())
+    }
+
     /// As Session.next_pass, after the last pass that was judged. Does not wait.
     #[getter]
     fn next_pass(&self) -> PyResult<Option<u64>> {

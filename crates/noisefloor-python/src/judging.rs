@@ -17,11 +17,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Any criterion.
 pub(crate) type Criterion = Box<dyn StoppingCriterion + Send>;
 
+/// What becomes of denoised pictures, where there are any.
+pub(crate) type Record = Option<Arc<Mutex<DenoisedRecord>>>;
+
 /// A session, and what became of its denoised pictures.
 pub(crate) struct Judged {
     /// Elsewhere while it judges in the background.
     pub(crate) session: Option<Session<Criterion>>,
-    pub(crate) record: Option<Arc<Mutex<DenoisedRecord>>>,
+    pub(crate) record: Record,
 }
 
 /// What a criterion is made from, again and again: a session that is resumed gets a new one.
@@ -64,7 +67,7 @@ impl Judging {
         })
     }
 
-    pub(crate) fn make(&self, py: Python<'_>) -> PyResult<(Criterion, Option<Arc<Mutex<DenoisedRecord>>>)> {
+    pub(crate) fn make(&self, py: Python<'_>) -> PyResult<(Criterion, Record)> {
         match self {
             Self::Noise(oracle) => Ok((oracle.clone(), None)),
             Self::Denoised { denoiser, lost, guides, passes, raised } => {

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Pixels, picture, plane};
 use crate::errors::{Error, ParameterError, Raise, SizeError, file_error, whole};
-use crate::judging::{Criterion, Hits, Judged, Judging, not_while_denoising};
+use crate::judging::{Criterion, Hits, Judged, Judging, Record, not_while_denoising};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pickle::reduced;
@@ -13,7 +13,7 @@ use noisefloor::{
     checkpoint::CheckpointError, session::Interruption, session::SessionError, source::PixelNoise,
     watch::Warning,
 };
-use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedRecord};
+use noisefloor_denoise::DEFAULT_JODS_LOST;
 use noisefloor_image::{WriteError, write_atomic};
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyUserWarning;
@@ -25,7 +25,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Film, oracle and limits of one picture: a renderer pushes samples, and is told which tiles need more.
 ///
@@ -504,7 +504,7 @@ fn fresh(
     judging: &Judging,
     params: Params,
     pixels: PixelNoise,
-) -> PyResult<(Session<Criterion>, Option<Arc<Mutex<DenoisedRecord>>>)> {
+) -> PyResult<(Session<Criterion>, Record)> {
     let (criterion, record) = judging.make(py)?;
     let mut session = Session::new(width, height, criterion, params).map_err(Raise::raise)?;
     session.set_pixels(pixels);

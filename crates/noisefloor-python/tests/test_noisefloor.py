@@ -266,6 +266,7 @@ class Backgrounds(unittest.TestCase):
             came += background.judge()
             image[:] = np.nan  # it was copied
         came += background.finish()
+        self.assertEqual(background.pending, 0)
         self.assertTrue(plain.done and background.done)
         self.assertIsNone(background.next_pass)
         self.assertEqual(background.requests(), [])

@@ -13,11 +13,15 @@
 //! let params = Params::default().with_tile(32).with_schedule(Schedule::Growing { step: 16 });
 //! let session = Session::new(64, 64, Oracle::bundled(), params)?;
 //! let background = Background::new(session, 2, WhenFull::Wait)?;
-//! while let Some(spp) = background.next_pass() {
-//!     let mut image = background.buffer();
-//!     image.fill([0.5; 3]); // your renderer: the mean of `spp` new samples of each pixel
-//!     background.push_image(spp, image)?;
-//!     background.judge()?;
+//! let mut spp = 0;
+//! while let Some(wanted) = background.next_pass() {
+//!     spp += 4; // your renderer: four more samples of each pixel, summed up on the GPU
+//!     if spp >= wanted && background.pending() == 0 {
+//!         let mut image = background.buffer();
+//!         image.fill([0.5; 3]); // the mean of these `spp` samples, read back
+//!         background.push_image(std::mem::take(&mut spp), image)?;
+//!         background.judge()?;
+//!     }
 //!     let news = background.news()?;
 //!     news.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
 //! }
@@ -132,6 +136,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     ///
     /// # Errors
     /// As of [`Background::new`].
+    #[expect(clippy::disallowed_types, reason = "where there are no threads, it is an error that says so")]
     pub fn new_in(
         session: Session<C>,
         waiting: usize,
@@ -223,6 +228,13 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         let mut state = self.shared.state();
         state.failed.clone().map_or(Ok(()), Err)?;
         Ok(std::mem::take(&mut state.news))
+    }
+
+    /// Passes that were handed over and are not judged yet. It does not wait. A renderer that goes on summing up until
+    /// this is 0 hands over as few passes as verdicts need, and renders past the stop only what one verdict takes.
+    pub fn pending(&self) -> usize {
+        let state = self.shared.state();
+        state.waiting.len() + usize::from(state.busy)
     }
 
     /// As [`Session::next_pass`], after the last pass that was judged. It does not wait.

@@ -13,8 +13,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::time::Instant;
 
-/// Samples of a pixel in one call: a driver ends calls that take seconds.
-const AT_ONCE: u32 = 16;
+/// Samples of a pixel in one call: a driver ends calls that take seconds, and what is rendered past a stop is that of
+/// some calls.
+const AT_ONCE: u32 = 4;
 
 /// What the shader is told, as it lies in memory there.
 #[repr(C)]
@@ -37,6 +38,8 @@ struct Renderer {
     /// Where the sums of a pass come back.
     back: wgpu::Buffer,
     pass: Pass,
+    /// Samples per pixel in the sums.
+    spp: u64,
 }
 
 impl Renderer {
@@ -93,31 +96,32 @@ impl Renderer {
             ],
         });
         let pass = Pass { width, height, samples: 0, first: 0, furnace: furnace.into() };
-        Ok(Some(Self { device, queue, pipeline, bindings, uniforms, sums, back, pass }))
+        Ok(Some(Self { device, queue, pipeline, bindings, uniforms, sums, back, pass, spp: 0 }))
     }
 
-    /// The mean of `spp` new samples of each pixel: summed up on the device, read back once.
-    fn render(&mut self, spp: u64, image: &mut [Rgb]) -> Result<(), Box<dyn Error>> {
-        let mut clear = self.device.create_command_encoder(&Default::default());
-        clear.clear_buffer(&self.sums, 0, None);
-        self.queue.submit([clear.finish()]);
-        let mut left = spp as u32;
-        while left > 0 {
-            self.pass.samples = left.min(AT_ONCE);
-            self.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&self.pass));
-            let mut encoder = self.device.create_command_encoder(&Default::default());
-            let mut compute = encoder.begin_compute_pass(&Default::default());
-            compute.set_pipeline(&self.pipeline);
-            compute.set_bind_group(0, &self.bindings, &[]);
-            compute.dispatch_workgroups(self.pass.width.div_ceil(8), self.pass.height.div_ceil(8), 1);
-            drop(compute);
-            self.queue.submit([encoder.finish()]);
-            // Samples are numbered here: a session in the background lags behind
-            self.pass.first += self.pass.samples;
-            left -= self.pass.samples;
-        }
+    /// Adds new samples of each pixel to the sums on the device, and waits for them.
+    fn add(&mut self, samples: u32) -> Result<(), Box<dyn Error>> {
+        self.pass.samples = samples;
+        self.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&self.pass));
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let mut compute = encoder.begin_compute_pass(&Default::default());
+        compute.set_pipeline(&self.pipeline);
+        compute.set_bind_group(0, &self.bindings, &[]);
+        compute.dispatch_workgroups(self.pass.width.div_ceil(8), self.pass.height.div_ceil(8), 1);
+        drop(compute);
+        self.queue.submit([encoder.finish()]);
+        self.device.poll(wgpu::PollType::wait_indefinitely())?;
+        // Samples are numbered here: a session in the background lags behind
+        self.pass.first += samples;
+        self.spp += u64::from(samples);
+        Ok(())
+    }
+
+    /// Reads back the mean of what was summed up, and its samples per pixel. The sums begin anew.
+    fn take(&mut self, image: &mut [Rgb]) -> Result<u64, Box<dyn Error>> {
         let mut copy = self.device.create_command_encoder(&Default::default());
         copy.copy_buffer_to_buffer(&self.sums, 0, &self.back, 0, self.back.size());
+        copy.clear_buffer(&self.sums, 0, None);
         self.queue.submit([copy.finish()]);
         let (send, receive) = std::sync::mpsc::channel();
         // Whoever waits is there: nothing to do if not
@@ -127,11 +131,11 @@ impl Renderer {
         let mapped = self.back.get_mapped_range(..)?;
         let sums: &[[f32; 4]] = bytemuck::cast_slice(&mapped);
         for (pixel, &[r, g, b, _]) in image.iter_mut().zip(sums) {
-            *pixel = [r, g, b].map(|sum| sum / spp as f32);
+            *pixel = [r, g, b].map(|sum| sum / self.spp as f32);
         }
         drop(mapped);
         self.back.unmap();
-        Ok(())
+        Ok(std::mem::take(&mut self.spp))
     }
 }
 
@@ -140,22 +144,21 @@ fn picture(size: (u32, u32)) -> Result<Option<Vec<Rgb>>, Box<dyn Error>> {
     let Some(mut renderer) = Renderer::new(size, false)? else { return Ok(None) };
     let params = Params::default().with_tile(64).with_schedule(Schedule::Growing { step: 16 });
     let session = Session::new(size.0 as usize, size.1 as usize, Oracle::bundled(), params)?;
-    let background = Background::new(session, 2, WhenFull::Wait)?;
+    let background = Background::new(session, 1, WhenFull::Wait)?;
     let start = Instant::now();
-    while let Some(spp) = background.next_pass() {
-        let mut image = background.buffer();
-        renderer.render(spp, &mut image)?;
-        background.push_image(spp, image)?;
-        background.judge()?;
+    while let Some(wanted) = background.next_pass() {
+        renderer.add(AT_ONCE)?;
+        if renderer.spp >= wanted && background.pending() == 0 {
+            let mut image = background.buffer();
+            let spp = renderer.take(&mut image)?;
+            background.push_image(spp, image)?;
+            background.judge()?;
+        }
         let news = background.news()?;
         news.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
         if !news.stops.is_empty() {
-            let open = background.requests().len();
-            println!(
-                "{:6.1} s, {} samples per pixel: {open} tiles are open",
-                start.elapsed().as_secs_f64(),
-                renderer.pass.first
-            );
+            let (seconds, open) = (start.elapsed().as_secs_f64(), background.requests().len());
+            println!("{seconds:6.1} s, {} samples per pixel: {open} tiles are open", renderer.pass.first);
         }
     }
     background.finish()?;
@@ -197,7 +200,8 @@ mod tests {
         let size = (64, 48);
         let Some(mut renderer) = Renderer::new(size, true).expect("a device that works") else { return };
         let mut image = vec![[0.0; 3]; 64 * 48];
-        renderer.render(40, &mut image).expect("a pass");
+        (0..10).for_each(|_| renderer.add(4).expect("samples"));
+        assert_eq!(renderer.take(&mut image).expect("a pass"), 40);
         let at = |x: usize, y: usize| image[y * 64 + x];
         assert_eq!((at(0, 0), at(63, 47)), ([1.0; 3], [1.0; 3]));
         for (x, y) in [(32, 24), (28, 20), (36, 30)] {
@@ -212,7 +216,8 @@ mod tests {
         let Some(mut renderer) = Renderer::new(size, false).expect("a device that works") else { return };
         let mut pass = |spp| {
             let mut image = vec![[0.0f32; 3]; 64 * 64];
-            renderer.render(spp, &mut image).expect("a pass");
+            (0..spp / 16).for_each(|_| renderer.add(16).expect("samples"));
+            renderer.take(&mut image).expect("a pass");
             image
         };
         let (a, b, long) = (pass(64), pass(64), pass(512));

@@ -79,8 +79,14 @@ fn stops_are_those_of_a_session_that_waits() {
     }
     assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
     let tiles = grid().len();
-    let expected =
-        NfBackgroundState { judged: passes, next_pass: 0, open_tiles: 0, stops: tiles, warnings: 0 };
+    let expected = NfBackgroundState {
+        judged: passes,
+        pending: 0,
+        next_pass: 0,
+        open_tiles: 0,
+        stops: tiles,
+        warnings: 0,
+    };
     assert_eq!(state(background), expected);
     let (mut count, mut requests) = (9, vec![NfRequest::default(); tiles]);
     // SAFETY: an array of the size given, and a pointer to a variable of this function.

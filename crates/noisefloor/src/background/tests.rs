@@ -247,10 +247,11 @@ fn a_renderer_waits_for_room() {
         }
         thread::sleep(Duration::from_millis(30));
         let most = handed.load(Ordering::Acquire);
-        assert!(most <= 4 && background.shared.state().waiting.len() == 2, "{most}");
+        assert!(most <= 4 && background.pending() == 3, "{most}");
         open.store(true, Ordering::Release);
     });
     assert_eq!(background.finish().unwrap().judged, 6);
+    assert_eq!(background.pending(), 0);
 }
 
 #[test]
