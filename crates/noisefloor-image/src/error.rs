@@ -108,7 +108,11 @@ pub enum PictureError {
         found: String,
     },
     /// It has several layers, none of which is known to be the picture, and nobody said which is meant.
-    #[error("{}: has the layers {found}, and does not say which is the picture; name one by --layer", path.display())]
+    #[error(
+        "{}: has the layers {found}, and does not say which is the picture; save that one by itself, or name it by \
+         --layer in `judge` and `metrics`",
+        path.display()
+    )]
     Layers {
         /// The file.
         path: PathBuf,

@@ -280,6 +280,8 @@ test("pictures are enlarged, brightened and set beside one another, by keyboard"
   await page.locator("#samples").selectOption("independent");
   await page.getByText("tiles have converged at").waitFor();
 
+  // A select would take the letters
+  await page.locator("#stage").focus();
   // Small pictures are enlarged by whole factors; tiles go with them
   const width = (id) => page.locator(id).evaluate((element) => element.getBoundingClientRect().width);
   const own = await page.locator("#picture").evaluate((canvas) => canvas.width);

@@ -164,7 +164,7 @@ export class Viewer {
   }
 
   wheel(event) {
-    if (!event.ctrlKey) return;
+    if (!event.ctrlKey || !this.picture) return;
     event.preventDefault();
     const { left, top } = get("stage").getBoundingClientRect();
     this.enlarge(this.zoom + (event.deltaY < 0 ? 1 : -1), [event.clientX - left, event.clientY - top]);

@@ -228,7 +228,11 @@ const MOST_STOPS: f32 = 20.0;
 /// `GET /api/pictures/{id}/shown.png?stops=0`: `stops` says by how many it is shown brighter.
 pub(crate) async fn shown(State(app): Shared, id: Named, uri: Uri) -> Answer {
     let tiles = tiles(&app, id).await?;
-    let asked = uri.query().into_iter().flat_map(|query| query.split('&')).find_map(|pair| pair.strip_prefix("stops="));
+    let asked = uri
+        .query()
+        .into_iter()
+        .flat_map(|query| query.split('&'))
+        .find_map(|pair| pair.strip_prefix("stops="));
     let stops = asked.map_or(Ok(0.0), str::parse).ok().filter(|stops: &f32| stops.abs() <= MOST_STOPS);
     let Some(stops) = stops else {
         return Err(refuse("that is no exposure in stops", "stops", "ask for a number from -20 to 20"));

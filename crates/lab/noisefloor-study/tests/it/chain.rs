@@ -62,9 +62,15 @@ fn thresholds_come_back_from_the_server_as_a_corpus() {
         assert!((zone.human_spp - tile.level95.min(levels[23] as f64)).abs() < 1e-6);
     }
     assert_eq!(corpus.scene_levels("wall").unwrap().count(), 48);
-    for file in
-        ["index.html", "report.json", "observers.csv", "tiles.csv", "thresholds.svg", "curves-wall.svg", "grid-door.png"]
-    {
+    for file in [
+        "index.html",
+        "report.json",
+        "observers.csv",
+        "tiles.csv",
+        "thresholds.svg",
+        "curves-wall.svg",
+        "grid-door.png",
+    ] {
         assert!(out.join(file).metadata().unwrap().len() > 100, "{file}");
     }
 }
