@@ -141,6 +141,7 @@ impl Oracle {
             doubted: trained.doubted,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
+            brightness_differs: false,
         })
     }
 
@@ -162,6 +163,7 @@ impl Oracle {
             doubted: false,
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
+            brightness_differs: false,
         }
     }
 
