@@ -64,6 +64,8 @@ pub enum Mistake {
     None,
     /// The mean of all samples so far.
     RunningMeans,
+    /// The same, with all samples so far as its number.
+    RunningTotals,
     /// The same random numbers for every batch.
     OneSeed,
     /// The default pixel filter of Mitsuba, a Gaussian of half a pixel: neighbours are correlated by e⁻¹.
@@ -86,9 +88,10 @@ pub enum Mistake {
 
 impl Mistake {
     /// All, in the order of the table.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::None,
         Self::RunningMeans,
+        Self::RunningTotals,
         Self::OneSeed,
         Self::GaussianFilter,
         Self::Blur,
@@ -106,6 +109,7 @@ impl Mistake {
         let each = |change: &dyn Fn(f32) -> f32| new().into_iter().map(|pixel| pixel.map(change)).collect();
         match self {
             Self::RunningMeans => (spp, samples.mean(0, first + spp)),
+            Self::RunningTotals => (first + spp, samples.mean(0, first + spp)),
             Self::OneSeed => (spp, samples.mean(0, spp)),
             Self::GaussianFilter => (spp, samples.filtered(&new(), [0.2, 1.0, 0.2])),
             Self::Blur => (spp, samples.filtered(&new(), [1.0; 3])),

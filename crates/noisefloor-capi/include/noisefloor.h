@@ -300,6 +300,11 @@ extern "C" {
 // none has. Valid until the next call on this thread fails, or the thread ends.
 const char *nf_last_error(void);
 
+// What is likely wrong with the pictures of the last nf_excess or nf_excess_denoised on this thread, such as another
+// exposure of one, in English, one a line; an empty string if nothing is. Valid until the next such call on this
+// thread, or the thread ends.
+const char *nf_last_warnings(void);
+
 // The version of the library, as text: "0.1.0". Lives as long as the program.
 const char *nf_version(void);
 
@@ -391,7 +396,8 @@ NfStatus nf_session_judge(const NfSession *session,
 // fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
 // exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
 // made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
-// values are interpolated linearly. Tables are kept until the program ends, each once.
+// values are interpolated linearly. NF_STATUS_ARGUMENT if the values are no display values, such as those of 8 bits. The
+// session owns what it needs of the table.
 NfStatus nf_session_set_tone_table(const NfSession *session,
                                    float exposure,
                                    float toe,
@@ -570,6 +576,10 @@ NfStatus nf_session_warning(const NfSession *session,
 NfStatus nf_session_share_pixels(const NfSession *session,
                                  bool shared);
 
+// Says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches have
+// one size, nothing tells that from values that were encoded for a screen.
+NfStatus nf_session_set_linear(const NfSession *session);
+
 // The picture: the mean of all samples, floats = 3 * width * height of the image. Pixels without samples are
 // black.
 NfStatus nf_session_image(const NfSession *session,
@@ -644,7 +654,8 @@ NfStatus nf_tuning_free(NfTuning *tuning);
 // How far the noise of the mean of two pictures is from what people do not see, where it is worst. a and b are
 // linear radiance, floats = 3 * width * height values each, rendered with the same setting and different seeds. Of
 // params, display and audience count; params may be NULL for the defaults. NF_STATUS_ARGUMENT if the pictures are
-// the same, or not finite.
+// the same, not finite, negative, or no two of one view with one exposure; nf_last_warnings has what is only likely to be
+// wrong with them.
 NfStatus nf_excess(const NfOracle *oracle,
                    const NfParams *params,
                    uint32_t width,

@@ -102,6 +102,11 @@ export interface SessionOptions {
   toneMapping?: ToneMapping;
   /** Whether neighbouring pixels have noise in common, as with a pixel filter: no warning says so then. */
   sharedPixels?: boolean;
+  /**
+   * Says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches have
+   * one size, nothing tells that from values that were encoded for a screen.
+   */
+  linear?: boolean;
   /** Gets each warning once, in `judge`: what is likely wrong with the samples. Unless given, the console does. */
   onWarning?: (text: string) => void;
 }
@@ -156,7 +161,12 @@ export interface Layout {
   stride?: number;
   /** Whether the first row is the bottom one, as WebGL reads pixels. */
   fromBottom?: boolean;
+  /** Whether the pixels are the bits of half floats, as three.js reads a target of HalfFloatType. */
+  halfFloats?: boolean;
 }
+
+/** Radiance. Integers are none: an `ARGUMENT` error, but for the bits of half floats (`halfFloats`). */
+export type Pixels = Float32Array | Float64Array | readonly number[] | Uint16Array;
 
 /**
  * Film, oracle and limits of one picture. It belongs to the thread that made it; a worker may have one of
@@ -179,9 +189,9 @@ export class Session {
    */
   readonly nextSpp: number;
   /** Adds the mean of `spp` new samples per pixel. */
-  push(pixels: ArrayLike<number>, batch: Layout & { spp: number }): void;
+  push(pixels: Pixels, batch: Layout & { spp: number }): void;
   /** Adds what is new in the mean of all `spp` samples per pixel so far. */
-  pushRunning(pixels: ArrayLike<number>, batch: Layout & { spp: number }): void;
+  pushRunning(pixels: Pixels, batch: Layout & { spp: number }): void;
   /** Judges the tiles that are due, and returns those that are now done; hands over new warnings. */
   judge(): TileState[];
   /** Where all tiles stand. */

@@ -184,6 +184,16 @@ pub extern "C" fn nf_session_share_pixels(session: *const NfSession, shared: boo
     })
 }
 
+/// Says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches have
+/// one size, nothing tells that from values that were encoded for a screen.
+#[unsafe(no_mangle)]
+pub extern "C" fn nf_session_set_linear(session: *const NfSession) -> NfStatus {
+    guard(|| {
+        handle::get(session)?.lock()?.set_linear();
+        Ok(())
+    })
+}
+
 /// The picture: the mean of all samples, floats = 3 * width * height of the image. Pixels without samples are
 /// black.
 #[unsafe(no_mangle)]

@@ -325,7 +325,8 @@ pub unsafe extern "C" fn nf_session_judge(session: *const NfSession, newly_done:
 /// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
 /// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
 /// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
-/// values are interpolated linearly. Tables are kept until the program ends, each once.
+/// values are interpolated linearly. NF_STATUS_ARGUMENT if the values are no display values, such as those of 8 bits. The
+/// session owns what it needs of the table.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_set_tone_table(
     session: *const NfSession,

@@ -58,6 +58,7 @@ impl Failure {
 
 thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
+    static LAST_WARNINGS: RefCell<CString> = RefCell::default();
     /// Whether this thread is inside a denoiser, whose session waits for it.
     pub(crate) static DENOISING: Cell<bool> = const { Cell::new(false) };
 }
@@ -103,6 +104,12 @@ fn set_last_error(message: &str) {
     LAST_ERROR.with(|last| *last.borrow_mut() = message);
 }
 
+/// Replaces what [`nf_last_warnings`] says.
+pub(crate) fn set_last_warnings(warnings: &[String]) {
+    let lines = CString::new(warnings.join("\n").replace('\0', "?")).unwrap_or_default();
+    LAST_WARNINGS.with(|last| *last.borrow_mut() = lines);
+}
+
 /// What a panic says.
 fn words(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
@@ -114,6 +121,14 @@ fn words(panic: &(dyn Any + Send)) -> &str {
 #[unsafe(no_mangle)]
 pub extern "C" fn nf_last_error() -> *const c_char {
     LAST_ERROR.try_with(|last| last.borrow().as_ptr()).unwrap_or(c"".as_ptr())
+}
+
+/// What is likely wrong with the pictures of the last nf_excess or nf_excess_denoised on this thread, such as another
+/// exposure of one, in English, one a line; an empty string if nothing is. Valid until the next such call on this
+/// thread, or the thread ends.
+#[unsafe(no_mangle)]
+pub extern "C" fn nf_last_warnings() -> *const c_char {
+    LAST_WARNINGS.try_with(|last| last.borrow().as_ptr()).unwrap_or(c"".as_ptr())
 }
 
 /// The version of the library, as text: "0.1.0". Lives as long as the program.

@@ -437,6 +437,51 @@ fn tone_mappings_of_ones_own_judge_as_in_rust() {
     assert!(status == NfStatus::Argument && none && said.contains("asks for 2"), "{said}");
     let (status, none, said) = broken(text, c"log3:1,2".as_ptr());
     assert!(status == NfStatus::Argument && none && said.contains("no input of a LUT"), "{said}");
+    let (status, none, said) = broken("LUT_1D_SIZE 2\n0 0 0\n255 255 255\n", null());
+    assert!(status == NfStatus::Argument && none && said.contains("entry 1 is 255"), "{said}");
+    let table = [255.0f32; 24];
+    let mut tone = null_mut();
+    // SAFETY: a table of the size given, and a variable of this function.
+    let status = unsafe { nf_tone_of_table(0.01, 4.0, table.as_ptr(), table.len(), 2, &mut tone) };
+    assert!(status == NfStatus::Argument && tone.is_null() && message().contains("is 255"), "{}", message());
+}
+
+/// What `judge` notices of two pictures, a search is told, too.
+#[test]
+fn pictures_that_are_unlike_each_other_are_noticed() {
+    let whole = Tile { index: 0, x: 0, y: 0, width: WIDTH, height: HEIGHT };
+    let (one, other) = (render(whole, 0, 1 << 16), render(whole, 1, 1 << 16));
+    let (mut oracle, mut excess) = (null_mut(), NfExcess::default());
+    // SAFETY: a pointer to a variable of this function.
+    assert_eq!(unsafe { nf_oracle_bundled(0.95, &mut oracle) }, NfStatus::Ok);
+    let mut compare = |change: fn(f32) -> f32, both: bool| {
+        let b: Vec<f32> = other.iter().map(|&c| change(c)).collect();
+        let a: Vec<f32> = if both { one.iter().map(|&c| change(c)).collect() } else { one.clone() };
+        // SAFETY: a living handle, arrays of the sizes given, and a variable of this function.
+        let status = unsafe {
+            nf_excess(
+                oracle,
+                null(),
+                WIDTH as u32,
+                HEIGHT as u32,
+                a.as_ptr(),
+                b.as_ptr(),
+                a.len(),
+                &mut excess,
+            )
+        };
+        // SAFETY: text of the library's, which lasts until the next such call.
+        let warnings = unsafe { CStr::from_ptr(nf_last_warnings()) }.to_str().unwrap().to_owned();
+        (status, warnings)
+    };
+    assert_eq!(compare(|c| c, false), (NfStatus::Ok, String::new()));
+    let (status, warnings) = compare(|c| 1.5 * c, false);
+    assert!(status == NfStatus::Ok && warnings.contains("times as bright"), "{warnings}");
+    assert_eq!(compare(|c| 8.0 * c, false), (NfStatus::Argument, String::new()));
+    assert!(message().contains("differ in brightness"), "{}", message());
+    assert_eq!(compare(|c| c - 2.0, true).0, NfStatus::Argument);
+    assert!(message().contains("negative"), "{}", message());
+    assert_eq!(nf_oracle_free(oracle), NfStatus::Ok);
 }
 
 #[test]
@@ -676,14 +721,13 @@ fn eyes_are_read() {
     assert!(message().contains("noisefloor calibrate"), "{}", message());
 }
 
-/// One seed for every batch is noticed by the next verdict; what is likely is text.
+/// What is certain is noticed by the next verdict; what is likely is text.
 #[test]
 fn wrong_samples_are_a_status_or_a_warning() {
-    let again = session(&params());
-    let first =
-        |_, mean: Vec<f32>| mean.iter().enumerate().map(|(i, _)| 0.5 + (i * i % 17) as f32 / 40.0).collect();
-    assert_eq!(fed_with(&again, first), NfStatus::Fault);
-    assert!(message().contains("the same batch twice"), "{}", message());
+    let bytes = session(&params());
+    let rounded = |_, mean: Vec<f32>| mean.iter().map(|c| (255.0 * c).round() / 255.0).collect();
+    assert_eq!(fed_with(&bytes, rounded), NfStatus::Fault);
+    assert!(message().contains("of 8 bits"), "{}", message());
 
     let constant = session(&params());
     assert_eq!(fed_with(&constant, |_, mean| vec![0.25; mean.len()]), NfStatus::Ok);

@@ -4,7 +4,7 @@ use crate::border;
 use crate::handle;
 use crate::oracle::NfOracle;
 use crate::params::NfParams;
-use crate::status::{Failure, NfStatus, guard};
+use crate::status::{Failure, NfStatus, guard, set_last_warnings};
 use noisefloor::stills::StillError;
 use noisefloor::tune::{Ending, Excess, Knob, KnobError, Next, PairError, PicturePair, Tuning};
 use noisefloor::{Params, Rgb, internal::check_image};
@@ -130,7 +130,8 @@ pub extern "C" fn nf_tuning_free(tuning: *mut NfTuning) -> NfStatus {
 /// How far the noise of the mean of two pictures is from what people do not see, where it is worst. a and b are
 /// linear radiance, floats = 3 * width * height values each, rendered with the same setting and different seeds. Of
 /// params, display and audience count; params may be NULL for the defaults. NF_STATUS_ARGUMENT if the pictures are
-/// the same, or not finite.
+/// the same, not finite, negative, or no two of one view with one exposure; nf_last_warnings has what is only likely to be
+/// wrong with them.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_excess(
     oracle: *const NfOracle,
@@ -148,12 +149,8 @@ pub unsafe extern "C" fn nf_excess(
         let (params, [a, b]) = unsafe { pictures(params, (width, height), [a, b], floats) }?;
         let size = (width as usize, height as usize);
         let pair = PicturePair::new(size, [a, b], UNKNOWN_SPP).map_err(unfit)?;
-        let (found, _) = pair.noise(&oracle.0, &params).map_err(|error| match error {
-            PairError::Still(error) => unfit(error),
-            PairError::Size(error) => error.into(),
-            PairError::Criterion(error) => error.into(),
-            other => Failure::new(NfStatus::Criterion, other.to_string()),
-        })?;
+        notice(&pair, &params)?;
+        let (found, _) = pair.noise(&oracle.0, &params).map_err(odd)?;
         // SAFETY: promised by the caller.
         unsafe { write(excess, found) }
     })
@@ -188,6 +185,7 @@ pub unsafe extern "C" fn nf_excess_denoised(
         let (params, [a, b, da, db]) = unsafe { pictures(params, (width, height), all, floats) }?;
         let size = (width as usize, height as usize);
         let pair = PicturePair::new(size, [a.clone(), b.clone()], UNKNOWN_SPP).map_err(unfit)?;
+        notice(&pair, &params)?;
         let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
         let wrong = |error: &dyn std::error::Error| Failure::new(NfStatus::Size, error.to_string());
         let compared = pair.compare(&params);
@@ -205,6 +203,23 @@ const TILE: usize = 64;
 
 fn unfit(error: StillError) -> Failure {
     Failure::new(NfStatus::Argument, error.to_string())
+}
+
+fn odd(error: PairError) -> Failure {
+    match error {
+        PairError::Still(error) => unfit(error),
+        PairError::Size(error) => error.into(),
+        PairError::Criterion(error) => error.into(),
+        other => Failure::new(NfStatus::Criterion, other.to_string()),
+    }
+}
+
+/// Keeps what the pictures say against a verdict for [`nf_last_warnings`](crate::status::nf_last_warnings).
+fn notice(pair: &PicturePair, params: &Params) -> Result<(), Failure> {
+    set_last_warnings(&[]);
+    let warnings = pair.notice(params).map_err(odd)?;
+    set_last_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
+    Ok(())
 }
 
 /// Parameters, and copies of pictures.

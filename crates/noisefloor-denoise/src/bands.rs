@@ -97,7 +97,7 @@ fn window(at: usize, radius: usize, edge: usize) -> f64 {
 }
 
 /// A place of an edge, mirrored at its first and last one.
-fn mirrored(place: isize, edge: usize) -> usize {
+pub(crate) fn mirrored(place: isize, edge: usize) -> usize {
     let period = (2 * (edge - 1)).max(1);
     let distance = place.unsigned_abs() % period;
     distance.min(period - distance).min(edge - 1)

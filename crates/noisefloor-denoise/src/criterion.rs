@@ -100,6 +100,10 @@ impl<D: Denoiser> DenoisedQuality<D> {
             let why = format!("it was asked for {} parts, and returned {}", parts.len(), made.len());
             return Err(CriterionError::Failed { name: self.name(), why });
         }
+        if let Some(odd) = made.iter().flatten().flatten().flatten().find(|value| !value.is_finite()) {
+            let why = format!("the denoiser returned {odd}, where radiance is finite");
+            return Err(CriterionError::Failed { name: self.name(), why });
+        }
         let errors = parts.iter().zip(&made).map(|(&part, [da, db])| {
             let [a, b] = halves.each_ref().map(|half| cut(half, size.0, part));
             let size = (part.width, part.height);
@@ -157,6 +161,10 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        if !(self.lost > 0.0 && self.lost.is_finite()) {
+            let why = format!("a tile may lose a positive number of JODs, not {}", self.lost);
+            return Err(CriterionError::Failed { name: self.name(), why });
+        }
         let began = Instant::now();
         let all = whole(view.film.grid().size());
         let parts = parts_around(tiles, view.film.grid().size());
@@ -262,15 +270,20 @@ fn judge_tile(
     if lost <= limit {
         return Judged { verdict: Verdict::new(evidence).expecting(Some(spp)), lost, undenoised: false };
     }
-    // What a denoiser smears however many samples it gets is done when the noise is: no tile takes more samples denoised
-    let noise = noise_of(film, view.display, tile, error.part(place).shown().to_vec());
-    let of_noise = eyes.lost(&noise, 1.0);
+    let brightness_differs = error.part(place).shift() > 0.0;
+    // What a denoiser smears however many samples it gets is done when the noise is: no tile takes more samples denoised.
+    // The noise is seen on the picture without noise, as good as the denoiser knows it; one that knows nothing of it, such as
+    // a black one, hides no noise
+    let [on_denoised, on_rendered] = [Some(error.part(place).shown().to_vec()), None]
+        .map(|shown| noise_of(film, view.display, tile, shown))
+        .map(|noise| (eyes.lost(&noise, 1.0), noise));
+    let (of_noise, noise) = if on_denoised.0 >= on_rendered.0 { on_denoised } else { on_rendered };
     if of_noise <= limit {
-        let verdict = Verdict::new(evidence).expecting(Some(spp));
+        let verdict = Verdict::new(evidence).expecting(Some(spp)).with_brightness(brightness_differs);
         return Judged { verdict, lost: of_noise, undenoised: evidence };
     }
     let verdict = Verdict::new(false).expecting(eyes.needed_by_either([&here, &noise], limit, spp));
-    Judged { verdict, lost, undenoised: false }
+    Judged { verdict: verdict.with_brightness(brightness_differs), lost, undenoised: false }
 }
 
 /// The part of the error that a tile is judged by, its own or the square around it, and what that has lost.
@@ -310,7 +323,7 @@ pub fn spp_without_denoising(
     let tiles: Vec<Tile> = grid.tiles().collect();
     let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
         let shown = tile.rows(grid.width()).flatten().map(|pixel| display.luma(denoised[pixel])).collect();
-        let noise = noise_of(film, display, tile, shown);
+        let noise = noise_of(film, display, tile, Some(shown));
         let mut eyes = Eyes { model: &model, room };
         let spp = eyes.needed(&noise, limit, (film.spp(tile.index), DECAY))?;
         Some(spp as f64 * tile.pixels() as f64)
@@ -343,7 +356,7 @@ pub fn spp_with_denoising(
         let mut eyes = Eyes { model: &model, room };
         let limit = limit / ESTIMATE_ERRS_BY;
         let (here, _) = judged_by(&error, tile, limit, &mut eyes);
-        let noise = noise_of(film, display, tile, error.part(tile).shown().to_vec());
+        let noise = noise_of(film, display, tile, Some(error.part(tile).shown().to_vec()));
         let spp = eyes.needed_by_either([&here, &noise], limit, film.spp(tile.index))?;
         Some(spp as f64 * tile.pixels() as f64)
     });
@@ -351,12 +364,13 @@ pub fn spp_with_denoising(
     Ok(samples.map(|samples| samples.iter().sum::<f64>() / (size.0 * size.1) as f64))
 }
 
-/// The noise of a tile of the film, as displayed, on what is shown there.
-fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Vec<f32>) -> DenoisedError {
+/// The noise of a tile of the film, as displayed, on what is shown there, or on itself.
+fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Option<Vec<f32>>) -> DenoisedError {
     let planes = TilePlanes::from_halves(film, display, tile);
     let inner = planes.inner;
     let rows =
         (inner.y..inner.y + inner.height).flat_map(|y| (inner.x..inner.x + inner.width).map(move |x| (y, x)));
+    let shown = shown.unwrap_or_else(|| rows.clone().map(|at| planes.image[at]).collect());
     let noise = rows.map(|at| planes.residual[at]).collect();
     DenoisedError::of((tile.width, tile.height), shown, noise, display)
 }

@@ -15,7 +15,8 @@
 //! The product of the residuals is far too noisy in a single pixel: the noise of A and B goes into it. So it is
 //! taken scale by scale, since noise is weak where it is coarse, and averaged over [`RADIUS`] pixels around.
 //! What people would see is then built from fields that have the right shape: half the difference of the
-//! denoised halves, plus, of each scale of the mean residual, the share that both halves have in common.
+//! denoised halves, plus, of each scale of the mean residual, the share that both halves have in common. Lines and dots, of
+//! which such averages show little, are looked for by themselves (`thin.rs`).
 //!
 //! In a film whose frames have noise of their own, the variance is new in each frame, and the bias stands still: the
 //! vision model gets them apart.
@@ -26,6 +27,7 @@ use crate::bands::Plane;
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::{DenoiseError, cut};
 use crate::parts::within;
+use crate::thin::thin_bias;
 use noisefloor::tune::{Excess, squares};
 use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes, internal::held};
 use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorkspace};
@@ -115,7 +117,15 @@ impl DenoisedError {
         };
         let shown = all.iter().zip(&residual).map(without).collect();
         let mut standing = vec![0.0; all.len()];
-        add_common([&mut residual, &mut standing], [plane(3), plane(4)]);
+        let residuals = [plane(3), plane(4)];
+        add_common([&mut residual, &mut standing], residuals.clone());
+        // A line is in what both have in common as far as its surroundings have it
+        let lacking =
+            thin_bias(size, residuals.each_ref().map(|residual| residual.values.as_slice()), &standing);
+        for ((sum, standing), lacking) in residual.iter_mut().zip(&mut standing).zip(lacking) {
+            *sum += lacking;
+            *standing += lacking;
+        }
         let light = |i: usize| Light::new(noisy.map(|p| p[i]), denoised.map(|p| p[i]));
         let light = (0..noisy[0].len()).map(light).collect();
         Ok(Self { size, shown, residual, standing, light, display: display.clone() })
@@ -173,7 +183,7 @@ impl DenoisedError {
     /// an edge as high as its mean is off, where noise does not explain that.
     ///
     /// # Errors
-    /// [`VisionError`] if a side of the tile has less than two pixels.
+    /// [`VisionError`] if the tile is larger than the vision model compares.
     pub fn jods_lost(
         &self,
         tile: Tile,
@@ -187,7 +197,7 @@ impl DenoisedError {
     /// [`ESTIMATE_ERRS_BY`]: where the ratio is 1, two thirds of that are estimated.
     ///
     /// # Errors
-    /// [`VisionError`] if a side of the picture has less than two pixels.
+    /// [`VisionError`] if the picture is larger than the vision model compares.
     pub fn excess(&self, lost: f64, viewing: &Viewing) -> Result<DenoisedExcess, VisionError> {
         let eyes = VisionModel::new(viewing);
         let ratio = |room: &mut VisionWorkspace, square: Tile| {
@@ -212,12 +222,17 @@ impl DenoisedError {
         room: &mut VisionWorkspace,
     ) -> Result<f64, VisionError> {
         let lost = 10.0 - self.compare(contrast, eyes, room)?.jod();
-        let height = shift(&self.light, &self.display);
+        let height = self.shift();
         if height == 0.0 {
             return Ok(lost);
         }
         let level = self.shown.iter().sum::<f32>() / self.shown.len().max(1) as f32;
-        Ok(lost.max(jods_of_edge((level, height), self.size, eyes, room)?))
+        Ok(lost.max(jods_of_edge((level, height), seen_size(self.size), eyes, room)?))
+    }
+
+    /// By how much the whole is brighter or darker than its samples, as displayed; 0 if noise explains that.
+    pub(crate) fn shift(&self) -> f32 {
+        shift(&self.light, &self.display)
     }
 
     /// The same of another strength.
@@ -264,10 +279,12 @@ impl DenoisedError {
     /// A map of just-objectionable differences lost, row-major.
     ///
     /// # Errors
-    /// [`VisionError`] if a side of the picture has less than two pixels.
+    /// [`VisionError`] if the picture is larger than the vision model compares.
     pub fn map_of_jods_lost(&self, eyes: &VisionModel) -> Result<Vec<f32>, VisionError> {
         let mut room = VisionWorkspace::default();
-        Ok(self.compare(1.0, eyes, &mut room)?.map().to_vec())
+        let mut found = self.compare(1.0, eyes, &mut room)?;
+        let (width, height) = self.size;
+        Ok(cut(found.map(), seen_size(self.size).0, Tile { index: 0, x: 0, y: 0, width, height }))
     }
 
     /// The picture with its error, at `contrast` times its strength, against the picture without.
@@ -277,15 +294,17 @@ impl DenoisedError {
         eyes: &VisionModel,
         room: &'a mut VisionWorkspace,
     ) -> Result<VisionComparison<'a>, VisionError> {
+        let size = seen_size(self.size);
         let with = |error: &[f32]| -> Vec<Rgb> {
-            self.shown.iter().zip(error).map(|(shown, error)| [shown + contrast * error; 3]).collect()
+            let pixels = self.shown.iter().zip(error).map(|(shown, error)| [shown + contrast * error; 3]);
+            seen(self.size, pixels.collect())
         };
-        let (test, reference) =
-            (with(&self.residual), self.shown.iter().map(|&shown| [shown; 3]).collect::<Vec<_>>());
+        let reference = seen(self.size, self.shown.iter().map(|&shown| [shown; 3]).collect());
+        let test = with(&self.residual);
         if self.standing.is_empty() || eyes.viewing().frames_per_second().is_none() {
-            return eyes.compare(&test, &reference, self.size, room);
+            return eyes.compare(&test, &reference, size, room);
         }
-        eyes.compare_frame(&test, &with(&self.standing), &reference, self.size, room)
+        eyes.compare_frame(&test, &with(&self.standing), &reference, size, room)
     }
 }
 
@@ -297,6 +316,20 @@ fn settle_sign(difference: &mut [f32]) {
     if skew < 0.0 || (skew == 0.0 && first.is_some_and(|&value| value < 0.0)) {
         difference.iter_mut().for_each(|value| *value = -*value);
     }
+}
+
+/// The vision model compares no picture with a side of one pixel: it gets two that are the same.
+fn seen_size((width, height): (usize, usize)) -> (usize, usize) {
+    (width.max(2), height.max(2))
+}
+
+/// A picture of this size as one of [`seen_size`].
+fn seen((width, height): (usize, usize), pixels: Vec<Rgb>) -> Vec<Rgb> {
+    let mut wide = if width == 1 { pixels.iter().flat_map(|&pixel| [pixel; 2]).collect() } else { pixels };
+    if height == 1 {
+        wide.extend_from_within(..);
+    }
+    wide
 }
 
 /// Shows one pixel. Residuals are multiplied by the slope of the display at the denoised mean: the display

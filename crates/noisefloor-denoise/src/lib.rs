@@ -51,6 +51,7 @@ mod mirrored;
 mod oidn;
 mod parts;
 mod record;
+mod thin;
 
 pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising};
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};

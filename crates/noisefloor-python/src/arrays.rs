@@ -185,7 +185,7 @@ fn array<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
 }
 
 /// What numpy calls the kind of the elements, and their name.
-fn dtype(array: &Bound<'_, PyAny>) -> PyResult<(char, String)> {
+pub(crate) fn dtype(array: &Bound<'_, PyAny>) -> PyResult<(char, String)> {
     let dtype = array.getattr("dtype")?;
     Ok((dtype.getattr("kind")?.extract()?, dtype.getattr("name")?.extract()?))
 }

@@ -43,6 +43,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 ///     (height, width, 3). The denoiser is then called with (radiance, albedo, normal); first_hits_are_clean knows whether it may take
 ///     them at their word.
 /// passes: 4 or 8 if the finished picture is the mean of so many mirror images (mirror_mean). Verdicts take one.
+/// linear: says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches
+///     have one size, nothing tells that from values that were encoded for a screen.
 ///
 /// Threads may call any method at any time; calls take turns. The interpreter's lock is released while
 /// judging. A copy, or what pickle makes of a session elsewhere, is one that was saved and resumed: tiles that
@@ -183,7 +185,7 @@ impl PySession {
 impl PySession {
     #[new]
     #[pyo3(signature = (width, height, oracle = None, params = None, shared_pixels = false, *, denoiser = None,
-        lost = DEFAULT_JODS_LOST, first_hits = None, passes = 1))]
+        lost = DEFAULT_JODS_LOST, first_hits = None, passes = 1, linear = false))]
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn new(
         py: Python<'_>,
@@ -196,6 +198,7 @@ impl PySession {
         lost: f64,
         first_hits: Option<Hits<'_>>,
         passes: usize,
+        linear: bool,
     ) -> PyResult<Self> {
         let (judging, default) = match (denoiser, oracle) {
             (Some(_), Some(_)) => {
@@ -214,7 +217,11 @@ impl PySession {
             }
         };
         let params = params.map_or(default, |params| params.0);
-        Self::fresh(py, (width, height), judging, params, noise(shared_pixels))
+        let session = Self::fresh(py, (width, height), judging, params, noise(shared_pixels))?;
+        if linear {
+            session.attached(py)?.set_linear();
+        }
+        Ok(session)
     }
 
     /// Width of the picture in pixels.

@@ -139,6 +139,7 @@ fn judge_still(
     let pair = SnapshotPair::new(evidence, image, &[other], params.tone_mapping.clone(), samples);
     let pair = pair.map_err(Raise::raise)?.seen_on(params.viewing);
     let grid = TileGrid::new(image.size.0, image.size.1, params.tile).map_err(Raise::raise)?;
+    let noticed = pair.notice(grid).map_err(Raise::raise)?;
     let described = pair.describe(oracle, grid).map_err(Raise::raise)?;
     let verdicts = oracle.judge_described_for(&described, params.audience).ok_or_else(|| {
         CriterionError::new_err(
@@ -151,9 +152,16 @@ fn judge_still(
     };
     Ok(PyJudged {
         size: image.size,
-        verdicts: grid.tiles().zip(verdicts).map(|(tile, verdict)| PyVerdict::of(tile, verdict)).collect(),
+        verdicts: grid
+            .tiles()
+            .zip(verdicts)
+            .zip(noticed.unlike)
+            .map(|((tile, verdict), unlike)| {
+                PyVerdict::of(tile, if unlike { noisefloor::Verdict::default() } else { verdict })
+            })
+            .collect(),
         samples: pair.samples(),
-        warnings: pair.warnings().iter().map(ToString::to_string).collect(),
+        warnings: noticed.warnings.iter().map(ToString::to_string).collect(),
         visible_noise,
     })
 }

@@ -1,6 +1,6 @@
 //! How a picture is shown by more than a curve: a table of colours, or a file of one.
 
-use crate::arrays::refuse_masked;
+use crate::arrays::{dtype, refuse_masked};
 use crate::errors::{ParameterError, PictureError, Raise, SizeError, file_error, whole};
 use crate::pickle::reduced;
 use noisefloor::Rgb;
@@ -57,7 +57,7 @@ pub(crate) fn made<'py>(py: Python<'py>, curve: &ToneCurve) -> PyResult<Option<B
 ///
 /// Between entries values are interpolated linearly. Tables are kept until the program ends, each once.
 ///
-/// Raises SizeError or ParameterError if there is no such table.
+/// Raises SizeError or ParameterError if there is no such table, PictureError if it holds integers.
 #[pyclass(frozen, eq, name = "ToneTable", module = "noisefloor", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct PyToneTable {
@@ -84,8 +84,15 @@ impl PyToneTable {
     #[pyo3(signature = (table, toe = 0.001, top = 1000.0))]
     fn new(table: &Bound<'_, PyAny>, toe: f32, top: f32) -> PyResult<Self> {
         refuse_masked(table.as_borrowed())?;
-        let array = table.py().import("numpy")?.call_method1("asarray", (table, "float32"));
+        let array = table.py().import("numpy")?.call_method1("asarray", (table,));
         let array = array.map_err(|error| SizeError::new_err(format!("no array of colours: {error}")))?;
+        let (kind, name) = dtype(&array)?;
+        if kind != 'f' {
+            return Err(PictureError::new_err(format!(
+                "a tone table of dtype {name} holds no display values: pass floats from 0 to 1, those of 8 bits divided by 255"
+            )));
+        }
+        let array = array.call_method1("astype", ("float32",))?;
         let Ok(array) = array.cast::<PyArray4<f32>>() else {
             return Err(SizeError::new_err("a tone table has shape (n, n, n, 3)"));
         };

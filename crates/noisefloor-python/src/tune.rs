@@ -5,13 +5,16 @@ use crate::errors::{CriterionError, ParameterError, PictureError, Raise, SizeErr
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
+use noisefloor::stills::StillWarning;
 use noisefloor::tune::{
     Ending, Excess, Knob, Look, Next, PairError, PicturePair, Search, Tuning, crops_for, most_in_squares,
 };
 use noisefloor::{Oracle, Params, Rgb, Tile};
 use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedExcess, DenoisedHalves};
 use numpy::PyArray2;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
+use std::ffi::CString;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Edge of the tiles in which noise is described.
@@ -285,9 +288,10 @@ enum ExcessLike<'py> {
 ///     lost; nobody has been asked about denoised pictures.
 /// spp: samples per pixel of each, for an audience that is no factor.
 ///
-/// The interpreter's lock is released.
+/// The interpreter's lock is released. Warns of what is likely wrong with the pictures, such as another exposure of one.
 ///
-/// Raises SizeError, CriterionError, and PictureError if the pictures cannot be judged: the same twice, for example.
+/// Raises SizeError, CriterionError, and PictureError if the pictures cannot be judged: the same twice, for example, or no
+/// two of one view.
 #[pyfunction]
 #[pyo3(signature = (a, b, *, oracle = None, params = None, denoised = None, lost = DEFAULT_JODS_LOST, spp = 128.0))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -316,7 +320,13 @@ pub(crate) fn excess(
         return Err(SizeError::new_err(format!("the pictures have different sizes, {size:?} and {other:?}")));
     }
     let denoised = denoised.map(|(a, b)| [copy(&a).1, copy(&b).1]);
-    py.detach(|| pool::run(|| compare(&oracle, &params, size, [a, b], denoised, lost, spp)))
+    let (excess, warnings) =
+        py.detach(|| pool::run(|| compare(&oracle, &params, size, [a, b], denoised, lost, spp)))?;
+    for warning in warnings {
+        let text = CString::new(warning.to_string())?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+    }
+    Ok(excess)
 }
 
 fn compare(
@@ -327,16 +337,18 @@ fn compare(
     denoised: Option<[Vec<Rgb>; 2]>,
     lost: f64,
     spp: f64,
-) -> PyResult<PyExcess> {
+) -> PyResult<(PyExcess, Vec<StillWarning>)> {
     let pair = PicturePair::new(size, pictures.clone(), spp).map_err(Raise::raise)?;
+    let unfit = |error| match error {
+        PairError::Still(error) => error.raise(),
+        PairError::Size(error) => error.raise(),
+        other => CriterionError::new_err(other.to_string()),
+    };
+    let warnings = pair.notice(params).map_err(unfit)?;
     let Some([da, db]) = denoised else {
-        let (excess, map) = pair.noise(oracle, params).map_err(|error| match error {
-            PairError::Still(error) => error.raise(),
-            PairError::Size(error) => error.raise(),
-            other => CriterionError::new_err(other.to_string()),
-        })?;
+        let (excess, map) = pair.noise(oracle, params).map_err(unfit)?;
         let squares = most_in_squares(size, &map);
-        return Ok(PyExcess { excess, size, map, squares });
+        return Ok((PyExcess { excess, size, map, squares }, warnings));
     };
     let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());
     let compared = pair.compare(params);
@@ -345,5 +357,5 @@ fn compare(
     let found = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;
     let DenoisedExcess { worst, squares, map } = found;
     let excess = pair.tell_apart(worst);
-    Ok(PyExcess { excess, size, map, squares })
+    Ok((PyExcess { excess, size, map, squares }, warnings))
 }

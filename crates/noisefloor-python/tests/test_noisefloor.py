@@ -442,7 +442,7 @@ class Faults(unittest.TestCase):
 
         cases = [
             (r"contain the samples .* push_running", running),
-            ("same batch twice", lambda count: self.independent(0)),
+            ("same batch twice", lambda count: self.independent(count // 2)),
             ("8 bits", lambda count: np.round(np.minimum(self.independent(count), 1) * 255) / 255),
             ("negative", lambda count: -1 - self.independent(count)),
             ("not finite", lambda count: self.independent(count) * np.nan),
@@ -451,6 +451,33 @@ class Faults(unittest.TestCase):
             with self.subTest(words):
                 with self.assertRaisesRegex(nf.FaultError, words):
                     self.feed(12, picture)
+
+    def test_running_means_as_totals_are_errors(self):
+        session, sum_of_all = self.session(), 0
+        with self.assertRaisesRegex(nf.FaultError, "contain the samples"):
+            for count in range(1, 13):
+                sum_of_all = sum_of_all + self.independent(count)
+                session.push_image(16 * count, np.float32(sum_of_all / count))
+                self.assertEqual(session.judge(), [])
+
+    def test_one_picture_again_and_again_stops_no_tile(self):
+        with self.assertWarnsRegex(UserWarning, "the same picture"):
+            session = self.feed(12, lambda count: self.independent(0))
+        self.assertEqual(session.stops(), [])
+
+    def test_what_values_are_is_asked_where_nothing_tells(self):
+        def dim(count):
+            return 0.5 * np.tanh(self.independent(count))
+
+        with self.assertWarnsRegex(UserWarning, "say so once"):
+            self.feed(8, dim)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.feed(8, dim, self.session(linear=True))
+
+    def test_half_floats_are_warned_of(self):
+        with self.assertWarnsRegex(UserWarning, "half floats"):
+            self.feed(8, lambda count: self.independent(count).astype(np.float16).astype(np.float32))
 
     def test_what_is_likely_is_warned_of_once(self):
         def blurred(count):
@@ -1067,6 +1094,17 @@ class Settings(unittest.TestCase):
         draw = np.random.default_rng(seed)
         return np.float32(0.4 + sigma * draw.standard_normal((size, size, 3)))
 
+    def test_pictures_that_are_unlike_each_other_are_noticed(self):
+        one, other = self.noisy(1, 2e-4), self.noisy(2, 2e-4)
+        nf.excess(one, other)
+        with self.assertWarnsRegex(UserWarning, "times as bright"):
+            nf.excess(one, 1.5 * other)
+        for unlike, words in ((5 * other, "differ in brightness"), (other - 1, "negative")):
+            with self.assertRaisesRegex(nf.PictureError, words):
+                nf.excess(one - 1 if words == "negative" else one, unlike)
+            with self.assertRaisesRegex(nf.PictureError, words):
+                nf.judge(one - 1 if words == "negative" else one, 64, unlike, 64)
+
     def test_the_threshold_of_a_renderer_is_found(self):
         params = nf.Params(tone_mapping="srgb")
         tuning = nf.Tuning(threshold=(0.05, 0.0001))
@@ -1172,6 +1210,9 @@ class Settings(unittest.TestCase):
             (np.zeros((3, 4, 3, 3)), nf.SizeError),
             (np.zeros((66, 66, 66, 3)), nf.ParameterError),
             (np.full((2, 2, 2, 3), np.nan), nf.ParameterError),
+            (np.full((2, 2, 2, 3), 255.0), nf.ParameterError),
+            (np.full((2, 2, 2, 3), 255, np.uint8), nf.PictureError),
+            (np.full((2, 2, 2, 3), 1), nf.PictureError),
         ]:
             with self.assertRaises(error):
                 nf.ToneTable(bad)

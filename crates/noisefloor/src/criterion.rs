@@ -77,8 +77,8 @@ pub struct ExpectedThreshold {
 pub struct Verdict {
     /// Whether the tile needs no more samples.
     pub converged: bool,
-    /// Probability that an observer sees no difference from the converged picture, if the criterion computes
-    /// one.
+    /// The share of people who see no difference from the converged picture, 0 to 1, if the criterion computes one:
+    /// the probability that one of them sees none.
     pub probability: Option<f32>,
     /// Where people are expected to stop seeing noise, whatever the criterion's own threshold; `None` if it
     /// has learned nothing from people.
@@ -97,6 +97,9 @@ pub struct Verdict {
     /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no
     /// penalty.
     pub probability_without_penalty: Option<f32>,
+    /// Whether what is to be shown of the tile in place of its samples, such as a denoised picture, is brighter or
+    /// darker than they are, by more than their noise explains.
+    pub brightness_differs: bool,
 }
 
 impl Verdict {
@@ -108,6 +111,11 @@ impl Verdict {
     /// The same with [`Verdict::expected_spp`].
     pub fn expecting(self, expected_spp: Option<u64>) -> Self {
         Self { expected_spp, ..self }
+    }
+
+    /// The same with [`Verdict::brightness_differs`].
+    pub fn with_brightness(self, brightness_differs: bool) -> Self {
+        Self { brightness_differs, ..self }
     }
 
     /// The same with [`Verdict::probability`], which no unfamiliar texture has lowered.
@@ -161,6 +169,14 @@ pub enum CriterionError {
         /// What went wrong, and its causes.
         why: String,
     },
+    /// The criterion does not keep what [`StoppingCriterion`] asks of implementers.
+    #[error("{name} breaks the contract of criteria: {what}")]
+    Contract {
+        /// The criterion.
+        name: String,
+        /// What it did.
+        what: String,
+    },
     /// The descriptor cannot describe the tile.
     #[error(transparent)]
     Descriptor(DescriptorError),
@@ -174,7 +190,8 @@ pub enum CriterionError {
 /// picture does): hence `&mut`. One that says its state can be saved and resumed with its session.
 ///
 /// # For implementers
-/// - Return one verdict for each tile, in order.
+/// - Return one verdict for each tile, in order, with probabilities from 0 to 1. Fewer, more or others are
+///   [`CriterionError::Contract`], and no tile stops by them.
 /// - Verdicts must not depend on the number of threads.
 /// - Declare in [`StoppingCriterion::needs`] what you read; what nobody needs is neither rendered nor kept.
 /// - Forget the previous film in [`StoppingCriterion::begin`]; a criterion without state has nothing to do
@@ -183,7 +200,7 @@ pub enum CriterionError {
 ///   yours can be resumed.
 #[auto_impl(&mut, Box)]
 pub trait StoppingCriterion {
-    /// A short name for reports, such as `"svm oracle"`.
+    /// A short name for reports, such as `"200 samples per pixel"`.
     fn name(&self) -> String;
 
     /// Everything its verdicts depend on besides the film and the display: model digest, threshold,
@@ -247,6 +264,25 @@ pub trait StoppingCriterion {
     fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
         state.is_empty() && self.state().is_some()
     }
+}
+
+/// Whether a criterion has answered what it was asked.
+pub(crate) fn check_verdicts(
+    criterion: &impl StoppingCriterion,
+    asked: &[Tile],
+    verdicts: &[Verdict],
+) -> Result<(), CriterionError> {
+    let broken = |what| Err(CriterionError::Contract { name: criterion.name(), what });
+    if verdicts.len() != asked.len() {
+        return broken(format!("{} verdicts on {} tiles", verdicts.len(), asked.len()));
+    }
+    for (tile, verdict) in asked.iter().zip(verdicts) {
+        let probabilities = [verdict.probability, verdict.probability_without_penalty];
+        if let Some(odd) = probabilities.into_iter().flatten().find(|p| !(0.0..=1.0).contains(p)) {
+            return broken(format!("a probability of {odd} for tile {}", tile.index));
+        }
+    }
+    Ok(())
 }
 
 /// The simplest criterion: a fixed number of samples per pixel everywhere.

@@ -25,6 +25,10 @@ pub const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 *
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
 pub const DEFAULT_KEY: f32 = 0.18;
 
+/// Least and most that an exposure can be.
+const DIMMEST: f32 = f32::from_bits(1);
+pub(crate) const BRIGHTEST: f32 = f32::MAX;
+
 /// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances
 /// above zero. The paper leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a
 /// geometric mean withstands fireflies.
@@ -126,6 +130,9 @@ impl ToneMapping {
     ///
     /// Noise bends a log-average, by a factor of 20 where most pixels have met no light yet: see
     /// [`ToneMapping::settle_noisy`].
+    ///
+    /// # Panics
+    /// If [`ToneMapping::check`] refuses the parameters.
     pub fn settle(&self, pixels: &[Rgb]) -> Display {
         self.settle_by(|| log_average(pixels).map(|value| LogAverage { value, error: 0.0 })).display
     }
@@ -133,6 +140,9 @@ impl ToneMapping {
     /// Settles the exposure that a noisy picture of this width will have once it has converged, from the
     /// picture alone: what differs among 2×2 pixels counts as noise. Two renderings tell noise from
     /// texture: see [`Film::settle`](crate::Film::settle).
+    ///
+    /// # Panics
+    /// If [`ToneMapping::check`] refuses the parameters.
     pub fn settle_noisy(&self, width: usize, pixels: &[Rgb]) -> Settled {
         let height = pixels.len().checked_div(width).unwrap_or(0);
         let pixel = |x: usize, y: usize| {
@@ -143,13 +153,19 @@ impl ToneMapping {
 
     /// The display, by the log-average where it depends on that.
     pub(crate) fn settle_by(&self, log_average: impl FnOnce() -> Option<LogAverage>) -> Settled {
+        if let Err(error) = self.check() {
+            panic!("{error}");
+        }
         let known = |exposure, curve| Settled { display: Display { exposure, curve }, error: 0.0 };
         match *self {
             Self::Custom { exposure, ref curve } => known(exposure, Curve::Custom(curve.clone())),
             Self::Reinhard { key, white } => {
                 let curve = Curve::Reinhard { white };
                 let Some(LogAverage { value, error }) = log_average() else { return known(1.0, curve) };
-                Settled { display: Display { exposure: (f64::from(key) / value) as f32, curve }, error }
+                // Light of less than 5·10⁻⁴⁰ asks for more than a number holds
+                let exposure =
+                    (f64::from(key) / value).clamp(f64::from(DIMMEST), f64::from(BRIGHTEST)) as f32;
+                Settled { display: Display { exposure, curve }, error }
             }
             Self::ReinhardAt { exposure, white } => known(exposure, Curve::Reinhard { white }),
             Self::Srgb { exposure } => known(exposure, Curve::Clamp),
@@ -271,6 +287,14 @@ impl Display {
     #[inline(always)]
     pub fn luma(&self, pixel: Rgb) -> f32 {
         luminance(self.encode(pixel))
+    }
+}
+
+#[cfg(test)]
+impl Display {
+    /// One that cannot be.
+    pub(crate) fn corrupt() -> Self {
+        Self { exposure: f32::NAN, curve: Curve::Clamp }
     }
 }
 

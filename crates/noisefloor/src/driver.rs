@@ -152,6 +152,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         let mut session = Session::new(info.width, info.height, criterion, params)?;
         session.set_source(source.identity()?);
         session.set_pixels(info.pixels);
+        session.set_linear();
         let cancel = Arc::new(AtomicBool::new(false));
         let (timeline, clock) = (Vec::new(), Clock::default());
         Ok(Self {
@@ -237,7 +238,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
                 self.end_all(Interruption::Cancelled, on_event);
                 break;
             }
-            // One call is made even so: whoever resumes in short runs arrives one day.
+            // One call is made even so, so that repeated short runs finish.
             let begun = self.session.film().total_samples() > self.samples_before;
             if begun && self.time_limit.is_some_and(|limit| start.elapsed() >= limit) {
                 self.end_all(Interruption::TimeLimit, on_event);

@@ -496,6 +496,9 @@ impl Film {
     /// Settles the exposure that the picture will have once it has converged. The halves tell noise from
     /// texture; without them, [`ToneMapping::settle_noisy`] says what does. Pixels without samples are left
     /// out.
+    ///
+    /// # Panics
+    /// If [`ToneMapping::check`] refuses the parameters.
     pub fn settle(&self, tone: &ToneMapping) -> Settled {
         let (grid, halves) = (self.grid, self.has_halves());
         // Found once for each column and row

@@ -169,6 +169,7 @@ impl Oracle {
             unmet: trained.unmet,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
+            brightness_differs: false,
         })
     }
 
@@ -191,6 +192,7 @@ impl Oracle {
             unmet: false,
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
+            brightness_differs: false,
         }
     }
 

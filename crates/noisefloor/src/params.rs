@@ -55,6 +55,12 @@ impl Schedule {
         }
     }
 
+    /// About half as many more, on the grid of steps.
+    pub(crate) fn half_more(self, samples: u64) -> u64 {
+        let step = self.step();
+        ((samples + samples / 2) / step).max(samples / step + 1).saturating_mul(step)
+    }
+
     /// Samples per pixel at the first verdict: the first step that has `least`.
     fn first(self, least: u64) -> u64 {
         least.div_ceil(self.step()).max(1).saturating_mul(self.step())

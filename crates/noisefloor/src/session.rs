@@ -1,7 +1,7 @@
 //! The push loop: for a renderer that owns its main loop.
 
-use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
-use crate::display::{Display, Settled, ToneMapping};
+use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View, check_verdicts};
+use crate::display::{BRIGHTEST, Display, Settled, ToneMapping};
 use crate::film::{Film, FilmError};
 use crate::params::{Audience, Params, ParamsError};
 use crate::rgb::Rgb;
@@ -220,6 +220,13 @@ impl<C: StoppingCriterion> Session<C> {
         self.film.negative()
     }
 
+    /// Says that what is pushed is linear radiance, so that no warning asks. Where no value is above 1 and all batches have
+    /// one size, nothing tells that from values that were encoded for a screen. A [`Driver`](crate::Driver) does this by
+    /// itself, as sources promise it.
+    pub fn set_linear(&mut self) {
+        self.watch.set_linear();
+    }
+
     /// Provides the quick noise-free reference, for criteria that need one.
     ///
     /// # Errors
@@ -293,6 +300,17 @@ impl<C: StoppingCriterion> Session<C> {
         tiles: &[Tile],
         pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
     ) -> Result<(), SessionError> {
+        self.push_given(spp, tiles, &pixels, &pixels)
+    }
+
+    /// The same of batches that the caller has given in other numbers, those of running means.
+    fn push_given<'a>(
+        &mut self,
+        spp: u64,
+        tiles: &[Tile],
+        pixels: &(impl Fn(Tile) -> TilePixels<'a> + Sync),
+        given: &(impl Fn(Tile) -> TilePixels<'a> + Sync),
+    ) -> Result<(), SessionError> {
         let (film, watch) = (&mut self.film, &mut self.watch);
         let glances: Vec<_> = tiles.par_iter().map(|&tile| watch.glance(tile, pixels(tile))).collect();
         let refused = tiles.iter().zip(glances).enumerate().find_map(|(i, (&tile, glance))| {
@@ -306,8 +324,8 @@ impl<C: StoppingCriterion> Session<C> {
         };
         let compared = |&tile: &Tile| (tile, watch.compare(film, tile, spp, pixels(tile)));
         let compared: Vec<_> = accepted.par_iter().map(compared).collect();
-        film.add_tiles(spp, accepted, &pixels);
-        watch.see(compared, spp, pixels);
+        film.add_tiles(spp, accepted, pixels);
+        watch.see(compared, spp, pixels, given);
         refused
     }
 
@@ -329,7 +347,10 @@ impl<C: StoppingCriterion> Session<C> {
     /// As of [`Session::push`].
     pub fn push_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), SessionError> {
         let (new, batch) = self.film.new_of_running(tile, total, mean)?;
-        self.push(tile, new, &batch)
+        let (place, pixels) = (self.film.grid().tile(tile), |tile| TilePixels::alone(tile, &batch));
+        self.push_given(new, &[place], &pixels, &|tile| TilePixels::alone(tile, mean))?;
+        self.watch.see_running();
+        Ok(())
     }
 
     /// Judges the tiles that are due, and returns those that are now done.
@@ -350,15 +371,18 @@ impl<C: StoppingCriterion> Session<C> {
         }
         let before = (self.display.clone(), self.settling);
         let Some(moved) = self.settle_display() else { return Ok(Vec::new()) };
+        self.check_exposure()?;
         self.watch.look(&self.film)?;
-        let (first, doubts) = (self.params.first_verdict(), self.watch.doubts());
+        // Whoever only counts samples does not mind what they are
+        let doubts = self.watch.doubts() && !self.criterion.only_counts();
+        let first = self.params.first_verdict();
         let (early, due_now): (Vec<Tile>, Vec<Tile>) = due.iter().partition(|t| {
             let (spp, for_verdict) = (self.film.spp(t.index), self.is_for_verdict(t));
             spp < first || (doubts && for_verdict && spp < self.params.max_spp)
         });
         for tile in early {
             let spp = self.film.spp(tile.index);
-            let next = if spp < first { first } else { spp + self.params.schedule.step() };
+            let next = if spp < first { first } else { self.next_in_doubt(tile.index, spp) };
             self.tiles[tile.index].goal = Goal::Verdict { spp: next.min(self.params.max_spp), streak: 0 };
         }
         let (judged, waited): (Vec<Tile>, Vec<Tile>) =
@@ -373,17 +397,20 @@ impl<C: StoppingCriterion> Session<C> {
         // Ask the criterion.
         let mut stops = Vec::new();
         if !(judged.is_empty() && again.is_empty()) {
-            let Some(view) = View::of(&self.film, &self.display, &self.params, &self.displayed_reference)
-            else {
+            // Whether the criterion fails or panics: until its verdicts are there, those that stand were given
+            // under the display of before
+            let display = std::mem::replace(&mut self.display, before.0);
+            let settling = std::mem::replace(&mut self.settling, before.1);
+            let reference = self.displayed_reference.take();
+            let Some(view) = View::of(&self.film, &display, &self.params, &reference) else {
                 return Ok(stops);
             };
             let asked: Vec<Tile> = again.iter().chain(&judged).copied().collect();
-            let verdicts = self.criterion.judge(&view, &asked);
-            if verdicts.is_err() {
-                // Nothing was looked at again yet
-                (self.display, self.settling, self.displayed_reference) = (before.0, before.1, None);
-            }
-            let mut verdicts = verdicts?.into_iter();
+            let verdicts = self.criterion.judge(&view, &asked)?;
+            check_verdicts(&self.criterion, &asked, &verdicts)?;
+            self.watch.see_verdicts(&verdicts);
+            (self.display, self.settling, self.displayed_reference) = (display, settling, reference);
+            let mut verdicts = verdicts.into_iter();
             let open = self.open_tiles() as f64 / self.tiles.len() as f64;
             for (tile, verdict) in again.into_iter().zip(&mut verdicts) {
                 stops.extend(self.take_again(tile.index, verdict, open));
@@ -405,6 +432,20 @@ impl<C: StoppingCriterion> Session<C> {
             }
         }
         Ok(stops)
+    }
+
+    /// Samples at which a tile of so many is looked at next while verdicts wait: about half as many more, and in batches of
+    /// another size if all had the same, as that tells noise from none.
+    fn next_in_doubt(&self, index: usize, samples: u64) -> u64 {
+        let next = self.params.schedule.half_more(samples);
+        let alike = self.watch.only_size(index) == Some(self.wanted(self.film.half_counts(index), next));
+        if alike { next.saturating_add(self.params.schedule.step()) } else { next }
+    }
+
+    /// Whether the exposure that the picture asks for can be had.
+    fn check_exposure(&self) -> Result<(), Fault> {
+        let settled = self.display.as_ref().filter(|_| self.settling.is_some()).map(Display::exposure);
+        settled.filter(|&exposure| exposure == BRIGHTEST).map_or(Ok(()), |exposure| Err(Fault::Dim(exposure)))
     }
 
     /// Looks at the samples as before a verdict, without one.
@@ -633,7 +674,7 @@ impl<C: StoppingCriterion> Session<C> {
     pub fn expected_samples_to_go(&self) -> Option<u64> {
         let (max, audience) = (self.params.max_spp, self.audience());
         self.tiles.iter().enumerate().filter(|(_, state)| state.stop.is_none()).try_fold(
-            0,
+            0u64,
             |sum, (index, state)| {
                 let goal = match state.goal {
                     Goal::Audience { spp } => spp,
@@ -642,7 +683,8 @@ impl<C: StoppingCriterion> Session<C> {
                     }
                 };
                 let pixels = self.film.grid().tile(index).pixels() as u64;
-                Some(sum + goal.saturating_sub(self.film.spp(index)) * pixels)
+                let missing = goal.saturating_sub(self.film.spp(index));
+                Some(missing.saturating_mul(pixels).saturating_add(sum))
             },
         )
     }

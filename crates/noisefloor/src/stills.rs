@@ -9,25 +9,23 @@ use crate::nested::shared_samples;
 use crate::oracle::Oracle;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
+use crate::watch::Encoding;
 use noisefloor_vision::Viewing;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use thiserror::Error;
 
+mod notice;
 mod origin;
+pub use notice::Noticed;
 pub use origin::{OriginRelation, SampleOrigin};
 
-/// Mean difference of a tile from which it may be unlike, as a share of the display's range.
-const UNLIKE: f64 = 0.1;
 /// Edge of the blocks in which pictures are compared for [`StillWarning`], in pixels.
 const BLOCK: usize = 8;
 /// Standard errors that chance does not reach, and the correlation worth a warning: those of
 /// [`crate::watch`].
 const CERTAIN: f64 = 6.5;
 const NOTABLE: f64 = 0.1;
-/// Ratio of brightness worth a warning. Where one picture has few samples, most of its blocks are darker than
-/// the mean, since few pixels have found what light is seldom found.
-const BRIGHTER: f64 = 1.25;
 
 /// A picture with its samples per pixel.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +50,23 @@ pub enum StillError {
     /// The samples per pixel are not a positive number.
     #[error("a positive number of samples per pixel is needed, not {0}")]
     Spp(f64),
+    /// The pixels do not fit the size, or there are none.
+    #[error("a picture of {}×{} pixels has {got}: it needs one at least, and as many as its size says", size.0, size.1)]
+    Pixels {
+        /// Width and height.
+        size: (usize, usize),
+        /// Pixels that there are.
+        got: usize,
+    },
+    /// A tile that does not lie in the picture.
+    #[error("a tile of {}×{} pixels at ({}, {}) does not lie in a picture of {}×{}",
+        tile.width, tile.height, tile.x, tile.y, size.0, size.1)]
+    Tile {
+        /// The tile.
+        tile: Tile,
+        /// Width and height of the picture.
+        size: (usize, usize),
+    },
     /// A pixel is not finite.
     #[error("pixel ({x}, {y}) is not finite; repair the render or paint over the pixel first")]
     NotFinite {
@@ -112,6 +127,18 @@ pub enum StillError {
          would count twice; leave one out", .0[0], .0[1]
     )]
     Twice([f64; 2]),
+    /// Light that cannot be.
+    #[error(
+        "the mean luminance of a picture is negative ({0:.3e}): light is not; look for a broken material or light, or for \
+         what was subtracted from it"
+    )]
+    Light(f64),
+    /// Two different things.
+    #[error(
+        "the pictures differ in brightness by more than noise explains, everywhere: they are no two renderings of one \
+         view with one exposure, and their difference says nothing about noise"
+    )]
+    Unlike,
     /// The model does not fit the tiles.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
@@ -123,27 +150,48 @@ pub enum StillError {
 pub enum StillWarning {
     /// Their difference is no independent noise of pixels.
     #[error(
-        "the noise of neighbouring pixels is correlated ({0:.2}): the pictures were denoised, blurred, \
-         scaled, or \
-         rendered with a wide pixel filter; verdicts are made for independent pixels, and come too early or \
-         too late"
+        "the noise of neighbouring pixels is correlated ({0:.2}): the pictures were denoised, blurred, scaled, or rendered \
+         with a wide pixel filter; verdicts are made for independent pixels, and come too early or too late"
     )]
     Neighbours(f64),
     /// One has another exposure.
     #[error(
-        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: render both \
-         with one \
+        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: render both with one \
          exposure, as their difference is not noise alone"
     )]
     Brightness(f64),
+    /// Tiles of another brightness.
+    #[error(
+        "in {tiles} of {of} tiles the pictures differ in brightness by more than noise explains, and these are not judged; \
+         compare renderings of one view with one exposure"
+    )]
+    Unlike {
+        /// How many.
+        tiles: usize,
+        /// Of how many.
+        of: usize,
+    },
+    /// All values are 8-bit numbers, and differ between the pictures.
+    #[error("all values are {0} of 8 bits: compare linear radiance in floating point, as it was rendered")]
+    Quantised(Encoding),
+    /// Noise is cut off at white, in this share of the noisy pixels, in per cent.
+    #[error(
+        "no value is above 1, and the noise of {0:.0} % of the noisy pixels ends there: compare linear radiance, not what \
+         is shown on a screen"
+    )]
+    Clipped(f64),
 }
 
 impl Still {
-    /// Checks that samples are positive and all pixels finite.
+    /// Checks that there are as many pixels as the size says, that samples are positive and all pixels finite.
     ///
     /// # Errors
-    /// [`StillError::Spp`], [`StillError::NotFinite`].
+    /// [`StillError::Pixels`], [`StillError::Spp`], [`StillError::NotFinite`].
     pub fn check(&self) -> Result<(), StillError> {
+        let (size, got) = (self.size, self.pixels.len());
+        if got == 0 || size.0.checked_mul(size.1) != Some(got) {
+            return Err(StillError::Pixels { size, got });
+        }
         if !(self.spp.is_finite() && self.spp > 0.0) {
             return Err(StillError::Spp(self.spp));
         }
@@ -229,7 +277,8 @@ impl<'a> SnapshotPair<'a> {
         tone: ToneMapping,
         samples: Option<Samples>,
     ) -> Result<Self, StillError> {
-        others.iter().try_for_each(|other| image.fits(other))?;
+        image.check()?;
+        others.iter().try_for_each(|other| other.check().and_then(|()| image.fits(other)))?;
         let (samples, others) = match samples {
             _ if evidence != Evidence::Halves => (Samples::Independent, others.to_vec()),
             Some(samples) => (samples, others.to_vec()),
@@ -303,13 +352,18 @@ impl<'a> SnapshotPair<'a> {
     /// What a tile is judged by.
     ///
     /// # Errors
-    /// [`StillError::Nested`] if nested pictures have as many samples.
+    /// [`StillError::Nested`] if nested pictures have as many samples, [`StillError::Tile`] if the tile does not
+    /// lie in them.
     pub fn planes(&self, tile: Tile) -> Result<TilePlanes, StillError> {
         Ok(TilePlanes { viewing: self.viewing, ..self.gather(tile)? })
     }
 
     fn gather(&self, tile: Tile) -> Result<TilePlanes, StillError> {
         let (image, size, display) = (self.image, self.image.size, &self.display);
+        let within = |at: usize, edge: usize, side: usize| edge > 0 && at < side && edge <= side - at;
+        if !(within(tile.x, tile.width, size.0) && within(tile.y, tile.height, size.1)) {
+            return Err(StillError::Tile { tile, size });
+        }
         let beside = |other: &Still, samples| {
             let pair = (image.rendering(), other.rendering());
             TilePlanes::from_pair(size, tile, display, pair, samples).ok_or(StillError::Nested(image.spp))
@@ -331,58 +385,6 @@ impl<'a> SnapshotPair<'a> {
                 Ok(TilePlanes { rounding: image.rounding + other.rounding, ..planes })
             }
         }
-    }
-
-    /// For each tile, whether its brightness differs between the two pictures by more than their noise
-    /// explains: by a tenth of the display's range on average, and three times the standard deviation from
-    /// pixel to pixel. Renderings of one view have no such tiles, and a verdict on one means nothing.
-    pub fn unlike_tiles(&self, grid: TileGrid) -> Vec<bool> {
-        let light = |still: &Still, pixel: usize| luminance(self.display.encode(still.pixels[pixel]));
-        let [one, other] = &self.pair;
-        let unlike = |tile: &Tile| {
-            let rows = tile.rows(self.image.size.0);
-            let differences: Vec<Vec<f32>> =
-                rows.map(|row| row.map(|p| light(one, p) - light(other, p)).collect()).collect();
-            is_unlike(&differences)
-        };
-        grid.tiles().collect::<Vec<_>>().par_iter().map(unlike).collect()
-    }
-
-    /// What the whole pictures say against a verdict on them.
-    ///
-    /// Neighbours: the correlation of the displayed difference with itself one pixel beside or below, within
-    /// blocks and without their means, which a picture of few samples has below the mean. Brightness: the
-    /// mean radiance and the median of blocks both differ, in one direction; a few bright pixels make the
-    /// one, and noise of many dark ones the other.
-    pub fn warnings(&self) -> Vec<StillWarning> {
-        let neighbours = self.correlation_of_neighbours().map(StillWarning::Neighbours);
-        let [one, other] = &self.pair;
-        let brightness = ratio_of_brightness(one, other).map(StillWarning::Brightness);
-        neighbours.into_iter().chain(brightness).collect()
-    }
-
-    fn correlation_of_neighbours(&self) -> Option<f64> {
-        let [one, other] = &self.pair;
-        let light =
-            |still: &Still, pixel: usize| f64::from(luminance(self.display.encode(still.pixels[pixel])));
-        const PAIRS: usize = 2 * (BLOCK - 1) * (BLOCK - 1);
-        let (mut sum, mut squares, mut energy) = (0.0, 0.0, 0.0);
-        for block in blocks(self.image.size) {
-            let differences: Vec<f64> =
-                block.iter().map(|&pixel| light(one, pixel) - light(other, pixel)).collect();
-            let mean = differences.iter().sum::<f64>() / differences.len() as f64;
-            let at = |x: usize, y: usize| differences[y * BLOCK + x] - mean;
-            for (x, y) in (0..BLOCK - 1).flat_map(|y| (0..BLOCK - 1).map(move |x| (x, y))) {
-                for beside in [at(x + 1, y), at(x, y + 1)] {
-                    let product = at(x, y) * beside;
-                    (sum, squares) = (sum + product, squares + product * product);
-                }
-            }
-            energy += differences.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>();
-        }
-        // By Hoeffding's bound, as in `watch`, with care: two pairs share each pixel
-        let correlation = sum / PAIRS as f64 / (energy / (BLOCK * BLOCK) as f64);
-        (sum.abs() > CERTAIN * (2.0 * squares).sqrt() && correlation.abs() > NOTABLE).then_some(correlation)
     }
 
     /// Describes all tiles, in their order, for [`Oracle::judge_described`]. Of a picture of less than one
@@ -425,44 +427,6 @@ fn settle(tone: &ToneMapping, image: &Still, other: &Still, samples: Samples) ->
         }
     };
     tone.settle_by(|| exposure::estimate(image.size, pixel)).display
-}
-
-/// Whether rows of differences have a mean that their changes from pixel to pixel do not explain.
-fn is_unlike(differences: &[Vec<f32>]) -> bool {
-    let count: usize = differences.iter().map(Vec::len).sum();
-    let mean = differences.iter().flatten().map(|&d| f64::from(d)).sum::<f64>() / count.max(1) as f64;
-    let beside = differences.iter().flat_map(|row| row.windows(2)).map(|pair| pair[1] - pair[0]);
-    let below = differences.windows(2).flat_map(|rows| rows[0].iter().zip(&rows[1])).map(|(a, b)| b - a);
-    let steps: Vec<f64> = beside.chain(below).map(|step| f64::from(step).powi(2)).collect();
-    // Of two independent pixels, the difference has twice the variance of one
-    let variance = steps.iter().sum::<f64>() / (2 * steps.len().max(1)) as f64;
-    !steps.is_empty() && mean.abs() > UNLIKE && mean.abs() > 3.0 * variance.sqrt()
-}
-
-/// The pixels of each whole block, row by row.
-fn blocks((width, height): (usize, usize)) -> impl Iterator<Item = Vec<usize>> {
-    let corners =
-        (0..height / BLOCK).flat_map(move |y| (0..width / BLOCK).map(move |x| (x * BLOCK, y * BLOCK)));
-    corners.map(move |(x, y)| (0..BLOCK * BLOCK).map(|i| (y + i / BLOCK) * width + x + i % BLOCK).collect())
-}
-
-/// How many times as bright one picture is as the other, if that is neither chance nor a few pixels.
-fn ratio_of_brightness(one: &Still, other: &Still) -> Option<f64> {
-    let light = |still: &Still, pixel: usize| f64::from(luminance(still.pixels[pixel]));
-    let (mut sums, mut squares, mut ratios) = ([0.0; 2], 0.0, Vec::new());
-    for block in blocks(one.size) {
-        let sum = |still: &Still| block.iter().map(|&pixel| light(still, pixel)).sum::<f64>();
-        let (a, b) = (sum(one), sum(other));
-        squares += block.iter().map(|&p| (light(one, p) - light(other, p)).powi(2)).sum::<f64>();
-        (sums[0], sums[1]) = (sums[0] + a, sums[1] + b);
-        // Black in both says nothing
-        ratios.extend((a > 0.0 || b > 0.0).then_some(a / b));
-    }
-    ratios.sort_by(f64::total_cmp);
-    let (mean, median) = (sums[0] / sums[1], *ratios.get(ratios.len() / 2)?);
-    let differs =
-        (mean > BRIGHTER && median > BRIGHTER) || (mean < 1.0 / BRIGHTER && median < 1.0 / BRIGHTER);
-    ((sums[0] - sums[1]).abs() > CERTAIN * squares.sqrt() && differs).then_some(mean)
 }
 
 /// Whether the pictures share samples, as far as their origins say or they show it: never a guess. Beside

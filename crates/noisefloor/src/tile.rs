@@ -123,10 +123,27 @@ pub enum TileError {
 /// # Ok::<(), noisefloor::tile::TileError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Unchecked")]
 pub struct TileGrid {
     width: usize,
     height: usize,
     edge: usize,
+}
+
+/// A grid as it was read.
+#[derive(Deserialize)]
+struct Unchecked {
+    width: usize,
+    height: usize,
+    edge: usize,
+}
+
+impl TryFrom<Unchecked> for TileGrid {
+    type Error = TileError;
+
+    fn try_from(Unchecked { width, height, edge }: Unchecked) -> Result<Self, TileError> {
+        Self::new(width, height, edge)
+    }
 }
 
 impl TileGrid {

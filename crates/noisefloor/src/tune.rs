@@ -30,7 +30,7 @@ use crate::film::blend_row;
 use crate::oracle::Oracle;
 use crate::params::Params;
 use crate::rgb::Rgb;
-use crate::stills::{SnapshotPair, Still, StillError};
+use crate::stills::{SnapshotPair, Still, StillError, StillWarning};
 use crate::tile::{Tile, TileError, TileGrid};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -215,9 +215,11 @@ pub fn squares((width, height): (usize, usize)) -> Vec<Tile> {
     rows.enumerate().map(|(index, (x, y))| Tile { index, ..square(x, y) }).collect()
 }
 
-/// The most that a map, row-major, has in each of these squares.
+/// The most that a map, row-major, has in each of these squares; infinite where a number is missing or is none.
 pub fn most_in_squares(size: (usize, usize), map: &[f32]) -> Vec<(Tile, f64)> {
-    let most = |tile: &Tile| tile.rows(size.0).flatten().map(|pixel| map[pixel]).fold(0.0, f32::max);
+    let told =
+        |pixel: usize| map.get(pixel).copied().filter(|number| !number.is_nan()).unwrap_or(f32::INFINITY);
+    let most = |tile: &Tile| tile.rows(size.0).flatten().map(told).fold(0.0, f32::max);
     squares(size).into_iter().map(|tile| (tile, f64::from(most(&tile)))).collect()
 }
 
@@ -257,17 +259,21 @@ impl PicturePair {
         let still =
             |pixels, spp| Still { size, pixels, spp, display_referred: false, rounding: 0.0, origin: None };
         let [one, other] = pictures.map(|pixels| still(pixels, spp));
-        if size.0.checked_mul(size.1) != Some(one.pixels.len()) || one.pixels.len() != other.pixels.len() {
-            return Err(StillError::Sizes { image: size, other: (other.pixels.len(), 1) });
-        }
         one.check()?;
         other.check()?;
-        if one.pixels == other.pixels {
-            return Err(StillError::Same);
-        }
+        one.fits(&other)?;
         let mut mean = vec![[0.0; 3]; one.pixels.len()];
         blend_row([&one.pixels, &other.pixels], [0.5; 2], &mut mean);
         Ok(Self { mean: still(mean, 2.0 * spp), halves: [one, other] })
+    }
+
+    /// What the two pictures say against a verdict on them, as [`SnapshotPair::notice`] has it.
+    ///
+    /// # Errors
+    /// [`PairError`] if they are no two pictures of one view, or no light.
+    pub fn notice(&self, params: &Params) -> Result<Vec<StillWarning>, PairError> {
+        let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
+        Ok(self.compare(params).notice(grid)?.warnings)
     }
 
     /// Width and height.
@@ -288,11 +294,13 @@ impl PicturePair {
     }
 
     /// How far the noise of the mean is from what the share of people asked for does not see, and the map of
-    /// it, row-major, 1 where it is just that.
+    /// it, row-major, 1 where it is just that. What is only likely to be wrong with the pictures is for
+    /// [`PicturePair::notice`] to say.
     ///
     /// # Errors
-    /// [`PairError`].
+    /// [`PairError`], also if the pictures are no two of one view, or no light.
     pub fn noise(&self, oracle: &Oracle, params: &Params) -> Result<(Excess, Vec<f32>), PairError> {
+        self.notice(params)?;
         let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
         let described = self.compare(params).describe(oracle, grid)?;
         let map = oracle.map_visible_noise(grid, &described, params.audience).ok_or(PairError::NoMap)?;
@@ -926,8 +934,8 @@ mod tests {
         let picture = noisy(1, 0.1);
         let new = |a: &[Rgb], b: &[Rgb]| PicturePair::new((256, 256), [a.to_vec(), b.to_vec()], 1.0);
         assert!(matches!(new(&picture, &picture), Err(StillError::Same)));
-        assert!(matches!(new(&picture, &picture[1..]), Err(StillError::Sizes { .. })));
-        assert!(matches!(new(&picture[1..], &picture[1..]), Err(StillError::Sizes { .. })));
+        assert!(matches!(new(&picture, &picture[1..]), Err(StillError::Pixels { got: 65_535, .. })));
+        assert!(matches!(new(&picture[1..], &picture[1..]), Err(StillError::Pixels { .. })));
         let mut other = noisy(2, 0.1);
         other[300] = [f32::NAN; 3];
         assert!(matches!(new(&picture, &other), Err(StillError::NotFinite { x: 44, y: 1 })));

@@ -3,8 +3,9 @@
 //!
 //! A [`Session`](crate::Session) watches every push. What is certain is a [`Fault`], an error of the push or
 //! of the next verdicts, so that no tile says "converged" on the strength of it. What is likely is a
-//! [`Warning`], once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples
-//! and verdicts of a session that gives no fault are those of one that does not watch, to the bit.
+//! [`Warning`], once, with the number it rests on ([`Session::warnings`](crate::Session::warnings)). Samples are
+//! added as they come. While a doubt is open that decides whether noise is what it seems, verdicts wait for more
+//! samples; where none is, they are those of a session that does not watch.
 //!
 //! # What is watched
 //! One pixel in each square of 8×8 pixels and its two neighbours, in small pictures one in 4×4, and four
@@ -15,7 +16,8 @@
 //!
 //! | watched | from | says |
 //! |---|---|---|
-//! | a − b against 0, where the tile is rough | two batches | [`Fault::Repeated`] |
+//! | a − b against 0 where the tile is rough, and batches that differ | three batches | [`Fault::Repeated`] |
+//! | the same while all are equal and of one size: a picture without noise, or one seed | two batches | no tile stops; [`Warning::Repeated`] after three |
 //! | correlation of a − c with b − d | a group | [`Fault::Shared`], [`Warning::Shared`], [`Warning::Anticorrelated`] |
 //! | the same, while (c − d)² is smaller than (a − b)² | a group | [`Fault::Running`] |
 //! | the same, but only with what all pixels of a tile have in common | a group | [`Warning::Changing`] |
@@ -62,14 +64,18 @@ mod shift;
 mod values;
 
 pub use borders::MixUp;
+pub(crate) use light::check as check_light;
 pub use light::{ImpossibleLight, LightCheck};
+pub(crate) use values::PictureValues;
 
+use crate::criterion::Verdict;
+use crate::display::luminance;
 use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::source::PixelNoise;
 use crate::tile::{Tile, TileGrid, TilePixels};
 use correlation::Sums;
-use group::TileWatch;
+use group::{Likeness, TileWatch};
 use light::SeenLight;
 use points::Points;
 use rayon::prelude::*;
@@ -108,8 +114,8 @@ pub enum Fault {
     },
     /// Batches equal to those before.
     #[error(
-        "{tiles} of {of} tiles got the same batch twice: give every batch random numbers of its own, such as a \
-         seed that counts batches"
+        "{tiles} of {of} tiles got the same batch twice, and other ones beside it: give every batch random numbers of \
+         its own, such as a seed that counts batches"
     )]
     Repeated {
         /// Tiles that got one twice.
@@ -143,6 +149,17 @@ pub enum Fault {
         /// What 8-bit numbers they are.
         encoding: Encoding,
     },
+    /// Numbers that are too coarse for what they are used for.
+    #[error(
+        "all values are {0}: means of so few bits end where a batch changes them by less than a step, and integers \
+         hold no light above white; add up and push 32-bit floats"
+    )]
+    Rounded(Precision),
+    /// Light too weak for 32-bit floats.
+    #[error(
+        "the picture has so little light that an exposure of {0:.1e} does not show it: multiply radiance by a constant"
+    )]
+    Dim(f32),
 }
 
 impl fmt::Debug for Fault {
@@ -166,6 +183,37 @@ impl fmt::Display for Encoding {
             Self::Linear => "numbers",
             Self::Srgb => "sRGB-decoded numbers",
         })
+    }
+}
+
+/// What numbers values are that are none of 32-bit floats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Precision {
+    /// Integers, over their largest, sRGB-encoded or not, or as they are.
+    Integers {
+        /// Their bits.
+        bits: u32,
+        /// Whether they are whole numbers.
+        whole: bool,
+    },
+    /// Floats, such as half floats, whose significand has 11 bits.
+    Floats {
+        /// Bits of the significand.
+        bits: u32,
+    },
+}
+
+impl fmt::Display for Precision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Integers { bits, whole: true } => write!(f, "whole numbers of {bits} bits"),
+            Self::Integers { bits, whole: false } => {
+                write!(f, "integers of {bits} bits over the largest of them")
+            }
+            Self::Floats { bits: 11 } => f.write_str("half floats"),
+            Self::Floats { bits } => write!(f, "floats of {bits} bits"),
+        }
     }
 }
 
@@ -224,8 +272,53 @@ pub enum Warning {
     )]
     Clipped(f64),
     /// One value everywhere.
-    #[error("every pixel of every batch is {0}: is this what was rendered?")]
-    Constant(f32),
+    #[error("every pixel of every batch is {}: is this what was rendered?", colour(.0))]
+    Constant(Rgb),
+    /// All batches are the same, and nothing says whether they have noise.
+    #[error(
+        "all batches of {tiles} of {of} tiles are the same picture: either it has no noise, or every batch got the same \
+         random numbers; no tile is done before a batch of another number of samples tells"
+    )]
+    Repeated {
+        /// Tiles of which all batches are the same.
+        tiles: usize,
+        /// Tiles that look noisy.
+        of: usize,
+    },
+    /// Numbers that are coarser than 32-bit floats.
+    #[error("all values are {0}: noise below their steps is lost; push 32-bit floats")]
+    Rounded(Precision),
+    /// What is shown in place of the samples is of another brightness.
+    #[error(
+        "in {tiles} of {of} tiles the denoised picture is brighter or darker than its samples, by more than noise explains: \
+         look whether the denoiser takes linear radiance and returns it; what it makes of these tiles is not shown"
+    )]
+    Brightness {
+        /// How many.
+        tiles: usize,
+        /// Of how many that were judged.
+        of: usize,
+    },
+    /// Nothing shows whether values are linear.
+    #[error(
+        "no value is above 1, and all batches have one size: nothing tells linear radiance from values that are encoded for \
+         a screen, by which tiles stop up to twice too early; if these are linear, say so once (set_linear in Rust, \
+         nf_session_set_linear in C, linear in Python and JavaScript)"
+    )]
+    Unsaid,
+    /// Running means have more samples than they are said to have.
+    #[error(
+        "the first running means differ by less than their numbers of samples say (by {0:.2} times as much in those after): \
+         the count seems to be behind the picture; wait until the renderer has written all of a pass before you read it, and \
+         count the samples that the picture then has"
+    )]
+    Behind(f64),
+}
+
+/// A grey as one number, and a colour as three.
+fn colour(pixel: &Rgb) -> String {
+    let [r, g, b] = pixel;
+    if r == g && g == b { r.to_string() } else { format!("({r}, {g}, {b})") }
 }
 
 /// Watches what one session gets.
@@ -235,12 +328,24 @@ pub(crate) struct Watch {
     /// Pixels share samples, as their source says.
     shared: bool,
     tiles: Vec<TileWatch>,
-    light: LightCheck,
     /// Of all groups, and of those between the last two looks.
     sums: [Sums; 2],
     /// Samples from which it is worth to look at the borders of tiles again.
     borders_at: u64,
     warnings: Vec<Warning>,
+    /// Whether running means were pushed.
+    running: bool,
+    /// Whether a tile got batches of several sizes.
+    sizes_vary: bool,
+    /// Values are linear radiance, as whoever pushes them says.
+    linear: bool,
+}
+
+/// What a batch says beside the picture that it is going to be added to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Beside {
+    shift: Option<Shift>,
+    likeness: Option<Likeness>,
 }
 
 impl Watch {
@@ -249,11 +354,17 @@ impl Watch {
             grid,
             shared: false,
             tiles: vec![TileWatch::default(); grid.len()],
-            light: LightCheck::default(),
             sums: [Sums::default(); 2],
             borders_at: 0,
             warnings: Vec::new(),
+            running: false,
+            sizes_vary: false,
+            linear: false,
         }
+    }
+
+    pub(crate) fn set_linear(&mut self) {
+        self.linear = true;
     }
 
     pub(crate) fn set_pixels(&mut self, pixels: PixelNoise) {
@@ -279,7 +390,7 @@ impl Watch {
             && kept.tiles.len() == self.grid.len()
             && self.grid.tiles().zip(&kept.tiles).all(fits);
         if fits {
-            *self = Self { shared: self.shared || kept.shared, ..kept };
+            *self = Self { shared: self.shared || kept.shared, linear: self.linear || kept.linear, ..kept };
         }
         fits
     }
@@ -293,71 +404,87 @@ impl Watch {
         SeenLight::of(self.points().of(tile).map(|(x, y)| mean.row(y)[x]))
     }
 
-    /// Whether a batch that fits its tile can be light at all, together with what the film has, after such a glance
-    /// at it.
+    /// Whether a batch that fits its tile can be light at all, together with what the film has of the tile, after such a
+    /// glance at it. It hangs on nothing else: neither on other tiles nor on batches that were refused.
     pub(crate) fn check_light(
-        &mut self,
+        &self,
         film: &Film,
         tile: Tile,
         spp: u64,
         mean: TilePixels<'_>,
         glance: SeenLight,
     ) -> Result<(), Fault> {
-        // The watched pixels first, and all only if those look wrong
-        let Err(seen) = self.light.check_seen(glance) else {
-            return Ok(());
-        };
-        let checked = if matches!(seen, ImpossibleLight::NotFinite { .. }) {
-            self.light.check_all(mean.iter())
-        } else {
-            // New samples may be differences of stored pictures: all that there are have to be light together
-            let had = film.spp(tile.index) as f64;
-            let (old, new) = (had / (had + spp as f64), spp as f64 / (had + spp as f64));
-            let pixels = tile.rows(self.grid.width()).flatten().zip(mean.iter());
-            self.light.check_all(pixels.map(|(pixel, new_mean)| {
-                let before = film.pixel(tile.index, pixel);
-                std::array::from_fn(|c| (f64::from(before[c]) * old + f64::from(new_mean[c]) * new) as f32)
-            }))
+        // The watched pixels first, and all only if those look wrong or there are none
+        let whole = || light::check(mean.iter());
+        let checked = match glance.by_itself() {
+            Ok(()) if !glance.is_of_nothing() => return Ok(()),
+            Err(ImpossibleLight::NotFinite { .. }) => whole(),
+            _ => whole().or_else(|light| {
+                // New samples may be differences of stored pictures: all that there are have to be light together
+                let had = film.spp(tile.index) as f64;
+                let (old, new) = (had / (had + spp as f64), spp as f64 / (had + spp as f64));
+                let pixels = tile.rows(self.grid.width()).flatten().zip(mean.iter());
+                let all = pixels.map(|(pixel, new_mean)| {
+                    let before = film.pixel(tile.index, pixel);
+                    std::array::from_fn(|c| {
+                        (f64::from(before[c]) * old + f64::from(new_mean[c]) * new) as f32
+                    })
+                });
+                if had > 0.0 { light::check(all) } else { Err(light) }
+            }),
         };
         checked.map_err(|light| Fault::Light { tile: tile.index, light })
     }
 
     /// What a batch says beside the picture that it is going to be added to.
-    pub(crate) fn compare(&self, film: &Film, tile: Tile, spp: u64, mean: TilePixels<'_>) -> Option<Shift> {
-        if self.shared {
-            return None;
-        }
-        Shift::of(film, tile, self.tiles[tile.index].batches, spp, mean)
+    pub(crate) fn compare(&self, film: &Film, tile: Tile, spp: u64, mean: TilePixels<'_>) -> Beside {
+        let watch = &self.tiles[tile.index];
+        let shift = if self.shared { None } else { Shift::of(film, tile, watch.batches, spp, mean) };
+        let likeness = watch.may_repeat().then(|| {
+            let points = || self.points().of(tile);
+            let at = |x: usize, y: usize| {
+                luminance(film.pixel(tile.index, (tile.y + y) * self.grid.width() + tile.x + x))
+            };
+            let before: Vec<[f32; 3]> = points().map(|(x, y)| [x - 1, x, x + 1].map(|x| at(x, y))).collect();
+            let now: Vec<[f32; 3]> = points().map(|place| points::light(mean, place)).collect();
+            group::likeness_of_noise(&before, &now)
+        });
+        Beside { shift, likeness: likeness.flatten() }
     }
 
-    /// Takes notice of batches that were added, of tiles in the order of the grid, and of what they said before.
+    /// Takes notice of batches that were added, of tiles in the order of the grid, of what they said before, and of the
+    /// numbers that the caller gave: of running means, those are not the batches'.
     pub(crate) fn see<'a>(
         &mut self,
-        seen: Vec<(Tile, Option<Shift>)>,
+        seen: Vec<(Tile, Beside)>,
         spp: u64,
         pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
+        given: impl Fn(Tile) -> TilePixels<'a> + Sync,
     ) {
+        self.sizes_vary |= seen.iter().any(|(tile, _)| !self.tiles[tile.index].is_size(spp));
         let (points, shared) = (self.points(), self.shared);
         let mut seen = seen.into_iter().peekable();
         let watched = self.tiles.iter_mut().enumerate();
-        let watched: Vec<(&mut TileWatch, (Tile, Option<Shift>))> = watched
+        let watched: Vec<(&mut TileWatch, (Tile, Beside))> = watched
             .filter_map(|(i, watch)| seen.next_if(|(tile, _)| tile.index == i).map(|of_it| (watch, of_it)))
             .collect();
-        watched.into_par_iter().for_each(|(watch, (tile, shift))| {
-            Self::see_tile(watch, points, shared, tile, spp, pixels(tile), shift.unwrap_or_default());
+        watched.into_par_iter().for_each(|(watch, (tile, beside))| {
+            Self::see_tile(watch, (points, shared), tile, spp, [pixels(tile), given(tile)], beside);
         });
     }
 
     fn see_tile(
         watch: &mut TileWatch,
-        points: Points,
-        shared: bool,
+        (points, shared): (Points, bool),
         tile: Tile,
         spp: u64,
-        mean: TilePixels<'_>,
-        shift: Shift,
+        [mean, given]: [TilePixels<'_>; 2],
+        beside: Beside,
     ) {
-        watch.sums.shift.add(&shift);
+        watch.sums.shift.add(&beside.shift.unwrap_or_default());
+        if let Some(likeness) = beside.likeness {
+            watch.resembles_mean(spp, likeness);
+        }
         let batch = watch.batches;
         watch.batches += 1;
         let group = batch / 4;
@@ -366,7 +493,7 @@ impl Watch {
         }
         let light = |place| points::light(mean, place);
         if group == 0 {
-            let values: Vec<Rgb> = points.of(tile).map(|(x, y)| mean.row(y)[x]).collect();
+            let values: Vec<Rgb> = points.of(tile).map(|(x, y)| given.row(y)[x]).collect();
             values.iter().for_each(|&value| watch.values.see(value));
             watch.see_values(values);
             watch.see(spp, points.at_first(tile).map(light).collect());
@@ -376,6 +503,11 @@ impl Watch {
         if let Some(found) = watch.compare(shared) {
             watch.sums.add(&found);
         }
+    }
+
+    /// Takes notice that what comes was a running mean.
+    pub(crate) fn see_running(&mut self) {
+        self.running = true;
     }
 
     /// Adds up what tiles have found since the last look, in their order: a sum of floating-point numbers depends on
@@ -394,12 +526,8 @@ impl Watch {
     /// Looks at all that was seen, before a verdict.
     pub(crate) fn look(&mut self, film: &Film) -> Result<(), Fault> {
         let values = self.gather();
-        self.check_repeats()?;
-        // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit
-        // picture's
-        if let Some(encoding) = values.quantised().filter(|_| self.tiles.iter().any(|tile| tile.varies)) {
-            return Err(Fault::Quantised { encoding });
-        }
+        let repeats = self.check_repeats()?;
+        let rounded = self.check_precision(&values, film)?;
         for sums in self.sums {
             sums.fault()?;
         }
@@ -411,28 +539,101 @@ impl Watch {
             self.borders_at = samples + samples / 2;
         }
         let found = found.chain(mixed_up.map(Warning::MixedUp));
-        let found: Vec<Warning> =
-            found.chain(self.sums[0].clipped(&values)).chain(values.constant()).collect();
-        for warning in found {
-            let kind = std::mem::discriminant(&warning);
-            if !self.warnings.iter().any(|known| std::mem::discriminant(known) == kind) {
-                self.warnings.push(warning);
-            }
-        }
+        let behind = if self.running { self.sums[0].behind() } else { None };
+        let found = found.chain(behind.map(Warning::Behind));
+        let clipped = self.sums[0].clipped(&values);
+        let unsaid = self.is_unsaid(&values).then_some(Warning::Unsaid).filter(|_| clipped.is_none());
+        let found: Vec<Warning> = found
+            .chain(clipped)
+            .chain(values.constant())
+            .chain(repeats)
+            .chain(rounded)
+            .chain(unsaid)
+            .collect();
+        found.into_iter().for_each(|warning| self.warn(warning));
         Ok(())
     }
 
-    /// Whether the first two batches look like running means, and four do not say otherwise: nothing may stop
-    /// till then.
-    pub(crate) fn doubts(&self) -> bool {
-        self.sums[0].doubt().is_some()
+    /// Takes a warning down, unless one of its kind is there.
+    fn warn(&mut self, warning: Warning) {
+        let kind = std::mem::discriminant(&warning);
+        if !self.warnings.iter().any(|known| std::mem::discriminant(known) == kind) {
+            self.warnings.push(warning);
+        }
     }
 
-    /// Whether half of the noisy tiles got a batch twice.
-    fn check_repeats(&self) -> Result<(), Fault> {
-        let noisy = self.tiles.iter().filter(|tile| tile.noisy);
-        let (tiles, of) = noisy.fold((0, 0), |(n, of), tile| (n + usize::from(tile.repeated), of + 1));
-        if 2 * tiles > of { Err(Fault::Repeated { tiles, of }) } else { Ok(()) }
+    /// Takes notice of what verdicts say of the picture that is shown: where denoisers take a rare sample for a firefly, a
+    /// few tiles become darker, and not most.
+    pub(crate) fn see_verdicts(&mut self, verdicts: &[Verdict]) {
+        let (of, tiles) =
+            (verdicts.len(), verdicts.iter().filter(|verdict| verdict.brightness_differs).count());
+        if 2 * tiles > of {
+            self.warn(Warning::Brightness { tiles, of });
+        }
+    }
+
+    /// Whether values may be encoded for a screen or not, and nobody has said.
+    fn is_unsaid(&self, values: &Values) -> bool {
+        let told = self.linear || self.sizes_vary || values.above_one;
+        !told && self.tiles.iter().any(|tile| tile.batches >= 4 && tile.varies)
+    }
+
+    /// Whether nothing may stop till more batches have come: the first two look like running means, and four do not
+    /// say otherwise; batches have more and more samples, as totals have, and four have not come yet, or look like
+    /// them; all are one picture of one size, which may have noise; or running means are of so few bits that they are
+    /// going to end.
+    pub(crate) fn doubts(&self) -> bool {
+        let sums = &self.sums[0];
+        sums.doubt().is_some()
+            || sums.may_be_totals()
+            || self.tiles.iter().any(|tile| tile.grows && tile.batches < 4)
+            || self.alike().is_some()
+            || (self.running && self.warnings.iter().any(|warning| matches!(warning, Warning::Rounded(_))))
+    }
+
+    /// The number of samples of each batch of a tile that may have noise or not, as all were the same picture.
+    pub(crate) fn only_size(&self, tile: usize) -> Option<u64> {
+        self.tiles[tile].only_size()
+    }
+
+    /// Tiles of which all batches are the same picture, if those are most that look noisy, and none tells whether there
+    /// is noise.
+    fn alike(&self) -> Option<(usize, usize)> {
+        let of = self.tiles.iter().filter(|tile| tile.noisy).count();
+        let tiles = self.tiles.iter().filter(|tile| tile.noisy && tile.may_have_noise()).count();
+        (2 * tiles > of && !self.tiles.iter().any(TileWatch::is_told)).then_some((tiles, of))
+    }
+
+    /// Whether the noise of half of the noisy tiles came twice. Pixels that were never seen to change may have none.
+    fn check_repeats(&self) -> Result<Option<Warning>, Fault> {
+        let noisy = || self.tiles.iter().filter(|tile| tile.noisy);
+        let (tiles, of) =
+            noisy().fold((0, 0), |(n, of), tile| (n + usize::from(tile.repeats_noise()), of + 1));
+        if 2 * tiles > of {
+            return Err(Fault::Repeated { tiles, of });
+        }
+        // Two of the first three batches that a session asks for have different sizes
+        let told = noisy().all(|tile| tile.batches > 2);
+        Ok(self.alike().filter(|_| told).map(|(tiles, of)| Warning::Repeated { tiles, of }))
+    }
+
+    /// Whether all values are of fewer bits than those of 32-bit floats.
+    fn check_precision(&self, values: &Values, film: &Film) -> Result<Option<Warning>, Fault> {
+        // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit picture's
+        if !self.tiles.iter().any(|tile| tile.varies) {
+            return Ok(None);
+        }
+        if let Some(encoding) = values.quantised() {
+            return Err(Fault::Quantised { encoding });
+        }
+        let Some(precision) = values.precision() else { return Ok(None) };
+        let most = self.grid.tiles().map(|tile| film.spp(tile.index)).max().unwrap_or(0);
+        let ends = match precision {
+            Precision::Integers { bits, whole } => whole || bits < 16,
+            // A sample changes a mean of n by 1/n of what it differs by: by less than four steps
+            Precision::Floats { bits } => self.running && most >> bits.saturating_sub(2) > 0,
+        };
+        if ends { Err(Fault::Rounded(precision)) } else { Ok(Some(Warning::Rounded(precision))) }
     }
 }
 

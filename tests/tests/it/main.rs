@@ -30,6 +30,9 @@ mod no_linfa;
 /// Extreme radiance, odd sizes, uneven halves.
 #[cfg(test)]
 mod numerics;
+/// Contracts of the core, by its public interface alone.
+#[cfg(test)]
+mod outside;
 /// What people said of real renders.
 #[cfg(test)]
 mod people;

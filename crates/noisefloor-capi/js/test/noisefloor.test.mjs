@@ -393,3 +393,64 @@ test("structs and numbers are those of the header", () => {
   assert.deepEqual(constants(/define NF_SCHEDULE_(\w+) (\d+)/g), named(SCHEDULES));
   assert.deepEqual(constants(/define NF_REASON_(\w+) (\d+)/g), named(REASONS));
 });
+
+test("only floats are radiance", () => {
+  const session = new Session(64, 64, options);
+  const half = (value) => {
+    const exponent = Math.floor(Math.log2(value));
+    return ((exponent + 15) << 10) | (Math.round(value * 2 ** (10 - exponent)) & 1023);
+  };
+  const refused = [
+    [new Uint16Array(3 * 64 * 64).fill(half(0.5)), /halfFloats/],
+    [new Uint8Array(3 * 64 * 64), /Uint8Array/],
+    [new Uint8ClampedArray(3 * 64 * 64), /Uint8ClampedArray/],
+    [new Int32Array(3 * 64 * 64), /Int32Array/],
+    [new BigUint64Array(3 * 64 * 64), /BigUint64Array/],
+    [new ArrayBuffer(12 * 64 * 64), /ArrayBuffer/],
+    [new DataView(new ArrayBuffer(12 * 64 * 64)), /DataView/],
+    [Array(3 * 64 * 64).fill("0.5"), /element 0 is a string/],
+    [new Array(3 * 64 * 64), /element 0 is an undefined/],
+    ["0".repeat(3 * 64 * 64), /String/],
+  ];
+  for (const [pixels, message] of refused) {
+    assert.throws(() => session.push(pixels, { spp: 8 }), { code: "ARGUMENT", message });
+    assert.throws(() => session.pushRunning(pixels, { spp: 8 }), { code: "ARGUMENT", message });
+  }
+  assert.ok(session.states().every(({ spp }) => spp === 0));
+  const bits = Uint16Array.from({ length: 3 * 64 * 64 }, (_, i) => half(0.25 + (i % 50) / 64));
+  session.push(bits, { spp: 8, halfFloats: true });
+  session.image().forEach((value, i) => assert.equal(value, 0.25 + (i % 50) / 64));
+  assert.throws(() => session.push(new Float32Array(3 * 64 * 64), { spp: 8, halfFloats: true }), {
+    code: "ARGUMENT",
+  });
+  session.push(new Float64Array(3 * 64 * 64).fill(0.5), { spp: 8 });
+  session.push(Array(3 * 64 * 64).fill(0.5), { spp: 8 });
+  session.close();
+});
+
+test("half floats mean what they are", () => {
+  const session = new Session(16, 16, { tile: 16 });
+  const bits = new Uint16Array(3 * 16 * 16);
+  bits.set([0x3c00, 0x0001, 0x7bff, 0x8000, 0x3555, 0x0400]);
+  session.push(bits, { spp: 8, halfFloats: true });
+  const [one, least, most, zero, third, normal] = session.image();
+  assert.deepEqual([one, least, most, normal], [1, 2 ** -24, 65504, 2 ** -14]);
+  assert.ok(zero === 0 && Math.abs(third - 1 / 3) < 1e-4);
+  session.close();
+});
+
+test("running means as totals are a fault", () => {
+  const [session, random] = [new Session(64, 64, { ...options, linear: true }), noise(5)];
+  const sum = new Float64Array(3 * 64 * 64);
+  let count = 0;
+  const pass = () => {
+    count += 16;
+    batch(64 * 64, 16, random).forEach((value, i) => (sum[i] += 16 * value));
+    session.push(sum.map((value) => value / count), { spp: count });
+    assert.deepEqual(session.judge(), []);
+  };
+  assert.throws(() => {
+    for (let i = 0; i < 12; i++) pass();
+  }, { code: "FAULT", message: /contain the samples/ });
+  session.close();
+});

@@ -388,3 +388,107 @@ fn few_open_tiles_are_judged_by_what_is_near() {
         }
     }
 }
+
+/// A denoiser that makes something of its own of a blurred picture.
+struct Spoiled(&'static str, Spoil);
+
+type Spoil = fn(f32) -> f32;
+
+impl Denoiser for Spoiled {
+    fn name(&self) -> String {
+        self.0.into()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        let blurred = noisefloor_testkit::bilateral(picture.size, picture.radiance, 10.0);
+        Ok(blurred.into_iter().map(|pixel| pixel.map(self.1)).collect())
+    }
+}
+
+/// What is shown as rendered is judged as rendered: a black picture hides no noise.
+#[test]
+fn what_a_spoiled_denoiser_leaves_as_rendered_has_lost_no_more_than_is_allowed() {
+    let size = (64, 48);
+    let level = |i: usize| match (i % 64, i / 64) {
+        (x, y) if x >= 32 && y >= 24 => 0.8,
+        (x, _) if x < 21 => 0.15,
+        _ => 0.4,
+    };
+    let truth: Vec<Rgb> = (0..64 * 48).map(|i| [level(i); 3]).collect();
+    let spoiled: [(&'static str, Spoil); 6] = [
+        ("black", |_| 0.0),
+        ("grey", |_| 0.4),
+        ("negative", |c| -c),
+        ("huge", |c| 1e30 * c),
+        ("dark", |c| 0.5 * c),
+        ("of little contrast", |c| 0.4 + 0.2 * (c - 0.4)),
+    ];
+    for (name, spoil) in spoiled {
+        for seed in 1..=3 {
+            let criterion = DenoisedQuality::new(Spoiled(name, spoil), 0.3);
+            let params = Params::default()
+                .with_schedule(Schedule::Growing { step: 48 })
+                .with_min_spp(48)
+                .with_max_spp(4_000);
+            let mut session = Session::new(size.0, size.1, criterion, params).unwrap();
+            let mut noise = Noise::keyed(&[seed, 77]);
+            while !session.is_done() {
+                for request in session.requests() {
+                    let deviation = 1.0 / (request.spp as f32).sqrt();
+                    let pixels = request.tile.rows(size.0).flatten();
+                    let mean: Vec<Rgb> =
+                        pixels.map(|i| [level(i) * (1.0 + deviation * noise.normal() as f32); 3]).collect();
+                    session.push(request.tile.index, request.spp, &mean).unwrap();
+                }
+                session.judge().unwrap();
+            }
+            let record = session.criterion().record();
+            assert!(record.lock().unwrap().undenoised.iter().all(|undenoised| *undenoised), "{name}");
+            let error =
+                DenoisedError::known(size, &session.film().image(), &truth, &session.display_so_far())
+                    .unwrap();
+            let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
+            let whole = Tile { index: 0, x: 0, y: 0, width: size.0, height: size.1 };
+            let lost = error.jods_lost(whole, &eyes, &mut room).unwrap();
+            println!("{name} {seed}: {lost} at {}", session.film().spp(0));
+            assert!(lost <= 0.3, "{name}, {seed}: {lost} at {}", session.film().spp(0));
+            let warned =
+                session.warnings().iter().any(|w| matches!(w, noisefloor::watch::Warning::Brightness { .. }));
+            let as_bright = ["grey", "of little contrast"].contains(&name);
+            assert!(warned || as_bright, "{name}: {:?}", session.warnings());
+        }
+    }
+}
+
+#[test]
+fn a_denoiser_that_returns_no_radiance_is_an_error() {
+    for odd in [f32::NAN, f32::INFINITY] {
+        let mut session = session(Simple::Flat(odd));
+        let error = run(&mut session).unwrap_err();
+        assert!(matches!(error, SessionError::Criterion(CriterionError::Failed { .. })), "{error}");
+    }
+}
+
+#[test]
+fn pictures_of_a_single_row_or_column_are_done() {
+    for size in [(1, 1), (1, 64), (64, 1), (2, 1)] {
+        let params = Params::default()
+            .with_min_spp(16)
+            .with_max_spp(300)
+            .with_schedule(Schedule::Growing { step: 16 });
+        let mut session =
+            Session::new(size.0, size.1, DenoisedQuality::new(Simple::Nothing, 0.3), params).unwrap();
+        while !session.is_done() {
+            for request in session.requests() {
+                session
+                    .push(request.tile.index, request.spp, &vec![[0.5; 3]; request.tile.pixels()])
+                    .unwrap();
+            }
+            session.judge().unwrap();
+        }
+        assert!(
+            session.stops().all(|stop| stop.reason == StopReason::Converged && stop.spp == 16),
+            "{size:?}"
+        );
+    }
+}

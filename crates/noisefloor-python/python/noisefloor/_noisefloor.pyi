@@ -213,6 +213,7 @@ class Session:
         lost: float = 0.3,
         first_hits: Sequence[Sequence[ArrayLike]] | None = None,
         passes: Literal[1, 4, 8] = 1,
+        linear: bool = False,
     ) -> Session: ...
     @property
     def width(self) -> int: ...

@@ -336,7 +336,7 @@ fn what_does_not_hold_together_is_refused() {
         assert!(refused(&|c| c.tiles.to_mut()[0].goal = goal));
     }
     assert!(refused(&|c| c.tiles.to_mut().swap(0, 1)));
-    assert!(refused(&|c| c.display = Some(crate::ToneMapping::Srgb { exposure: f32::NAN }.settle(&[]))));
+    assert!(refused(&|c| c.display = Some(Display::corrupt())));
     for (samples, error) in [(1, f64::NAN), (u64::MAX, 0.0)] {
         assert!(refused(&|c| c.settling = Some(Settling { samples, error })));
     }

@@ -1,7 +1,7 @@
 //! Colour look-up tables as the text of `.cube` files (Adobe, "Cube LUT Specification 1.0", and Resolve's 1D before 3D).
 
 use crate::display::lut::{ColourLut, LutTable};
-
+use crate::display::tone_table::is_displayable;
 use crate::rgb::Rgb;
 use crate::text::{lines, stand_in, text};
 use thiserror::Error;
@@ -55,6 +55,17 @@ pub enum CubeError {
         /// All there are.
         bytes: usize,
     },
+    /// An entry that is no display value.
+    #[error(
+        "entry {entry} is {value}: what a LUT returns is shown, and lies from 0 to 1; divide values of 8, 10 or 12 bits by the \
+         largest"
+    )]
+    Value {
+        /// Its place, from 0.
+        entry: usize,
+        /// The value.
+        value: f32,
+    },
 }
 
 /// Parses the content of a `.cube` file. Memory grows with its length, whatever sizes it claims.
@@ -105,6 +116,11 @@ pub fn parse_cube(bytes: &[u8]) -> Result<ColourLut, CubeError> {
         return Err(CubeError::Entries { expected, got: values.len() });
     }
     let cube = values.split_off(entries[0]);
+    let shown = if cube.is_empty() { &values } else { &cube };
+    let off = shown.iter().enumerate().find_map(|(entry, value)| {
+        value.iter().find(|value| !is_displayable(**value)).map(|&value| CubeError::Value { entry, value })
+    });
+    off.map_or(Ok(()), Err)?;
     let curve = head.size_1d.map(|size| LutTable { size, range: first, values });
     let cube = head.size_3d.map(|size| LutTable { size, range: second, values: cube });
     Ok(ColourLut::new(curve, cube))

@@ -77,8 +77,8 @@ impl ColourLut {
     }
 
     /// The LUT as a tone mapping: exposed linear radiance (Rec.709 primaries) is encoded as `input` says, and
-    /// what the LUT returns is taken for display-encoded sRGB. It stays in memory until the program ends. Its
-    /// identity is its content, not its file.
+    /// what the LUT returns is taken for display-encoded sRGB. The curve owns the LUT. Its identity is its content, not
+    /// its file.
     pub fn into_tone_curve(self, input: LutInput) -> ToneCurve {
         let mut identity = format!("lut {input}").into_bytes();
         for table in [&self.curve, &self.cube] {

@@ -50,10 +50,25 @@ pub enum ToneTableError {
     /// A value is not finite.
     #[error("value {0} of the tone table is not finite")]
     NotFinite(usize),
+    /// A value is no display value.
+    #[error(
+        "value {place} of the tone table is {value}: display values are sRGB-encoded and lie from 0 to 1; divide those of \
+         8 bits by 255"
+    )]
+    Value {
+        /// Its place among all numbers.
+        place: usize,
+        /// The value.
+        value: f32,
+    },
 }
 
+/// How far beyond 0 and 1 a display value may lie, as a curve that is not cut off reaches: what is shown is cut off.
+const BEYOND: f32 = 0.5;
+
 impl ToneTable {
-    /// `edge`³ display values (sRGB-encoded, 0 to 1), red fastest, blue slowest.
+    /// `edge`³ display values (sRGB-encoded, 0 to 1), red fastest, blue slowest. Values up to a half beyond these ends are
+    /// cut off where they are shown.
     ///
     /// # Errors
     /// [`ToneTableError`].
@@ -62,8 +77,9 @@ impl ToneTable {
         if values.len() != edge.pow(3) {
             return Err(ToneTableError::Entries { edge, got: values.len() });
         }
-        match values.iter().flatten().position(|value| !value.is_finite()) {
-            Some(place) => Err(ToneTableError::NotFinite(place)),
+        match values.as_flattened().iter().enumerate().find(|(_, value)| !is_displayable(**value)) {
+            Some((place, value)) if !value.is_finite() => Err(ToneTableError::NotFinite(place)),
+            Some((place, &value)) => Err(ToneTableError::Value { place, value }),
             None => Ok(Self { edge, toe, top, scale, values }),
         }
     }
@@ -96,7 +112,7 @@ impl ToneTable {
         &self.values
     }
 
-    /// The table as a tone mapping. It is kept until the program ends; its identity is its content.
+    /// The table as a tone mapping, which owns it; its identity is its content.
     pub fn into_tone_curve(self) -> ToneCurve {
         let numbers = [self.edge as f32, self.toe, self.scale];
         let bytes = numbers.iter().chain(self.values.as_flattened()).flat_map(|number| number.to_le_bytes());
@@ -118,6 +134,11 @@ impl ToneTable {
         let plane = |b| mix(row(g, b), row(g + 1, b), y);
         mix(plane(b), plane(b + 1), z)
     }
+}
+
+/// Whether that may be shown, and cut off at the ends of the display.
+pub(super) fn is_displayable(value: f32) -> bool {
+    (-BEYOND..=1.0 + BEYOND).contains(&value)
 }
 
 /// Entries for each stop of an axis.
@@ -175,5 +196,10 @@ mod tests {
         assert_eq!(ToneTable::radiances(1, 0.1, 1.0), Err(ToneTableError::Edge(1)));
         let nan = ToneTable::new(2, 0.1, 1.0, vec![[0.0, f32::NAN, 0.0]; 8]);
         assert_eq!(nan, Err(ToneTableError::NotFinite(1)));
+        // Those of 8 bits, and of a byte that means white
+        for (value, fits) in [(255.0, false), (2.0, false), (-1.0, false), (1.02, true), (-0.01, true)] {
+            let table = ToneTable::new(2, 0.1, 1.0, vec![[0.0, 0.0, value]; 8]);
+            assert_eq!(table.is_ok(), fits, "{table:?}");
+        }
     }
 }

@@ -88,9 +88,9 @@ pub struct Stop {
     pub tile: Tile,
     /// Samples per pixel when it stopped.
     pub spp: u64,
-    /// Probability, at the last verdict, that an observer of the training data sees no difference; `None` if
-    /// never judged or not offered. Small where a tile has converged for a less demanding
-    /// [audience](crate::Params::audience), who have enough where those still see noise.
+    /// [`Verdict::probability`] of the last verdict, for the observers of the training data; `None` if never judged
+    /// or not offered. Small where a tile has converged for a less demanding [audience](crate::Params::audience), who
+    /// have enough where those still see noise.
     pub probability: Option<f32>,
     /// Why.
     pub reason: StopReason,

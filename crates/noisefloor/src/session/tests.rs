@@ -187,7 +187,7 @@ fn warnings_are_handed_over_once() {
         s.push_image(50, &[[0.3; 3]; 80 * 32]).unwrap();
     }
     s.judge().unwrap();
-    assert_eq!(s.new_warnings(), [Warning::Constant(0.3)]);
+    assert_eq!(s.new_warnings(), [Warning::Constant([0.3; 3])]);
     assert_eq!((s.new_warnings(), s.warnings().len()), (Vec::new(), 1));
 }
 

@@ -218,27 +218,36 @@ impl Search {
 
     /// Crops around the worst squares, none of them in the middle of another.
     fn choose(&self, seen: &[Seen]) -> Vec<Place> {
-        let all = seen.iter().flat_map(|seen| seen.squares.iter().map(move |square| (seen, square)));
-        let mut all: Vec<_> = all.collect();
-        all.sort_by(|(_, (_, a)), (_, (_, b))| b.total_cmp(a));
+        let edge =
+            |of: &Seen, end: fn(&Tile) -> usize| of.squares.iter().map(|(square, _)| end(square)).max();
+        let mut all: Vec<(usize, [usize; 2], Tile, f64)> = Vec::new();
+        for of in seen {
+            let sides: [fn(&Tile) -> usize; 2] = [
+                |square| square.x.saturating_add(square.width),
+                |square| square.y.saturating_add(square.height),
+            ];
+            let size = sides.map(|end| edge(of, end).unwrap_or(0));
+            all.extend(of.squares.iter().map(|&(square, ratio)| (of.place.view, size, square, ratio)));
+        }
+        all.sort_by(|a, b| b.3.total_cmp(&a.3));
         let mut crops: Vec<Place> = Vec::new();
-        for (seen, (square, _)) in all {
-            let edge = |end: fn(&Tile) -> usize| seen.squares.iter().map(|(square, _)| end(square)).max();
-            let (width, height) =
-                (edge(|s| s.x + s.width).unwrap_or(0), edge(|s| s.y + s.height).unwrap_or(0));
+        for (view, [width, height], square, _) in all {
+            if crops.len() == self.crops {
+                break;
+            }
             let start = |at: usize, edge: usize, side: usize| {
                 (at + edge / 2).saturating_sub(CROP / 2).min(side.saturating_sub(CROP))
             };
             let (x, y) = (start(square.x, square.width, width), start(square.y, square.height, height));
             let tile = Tile { index: 0, x, y, width: CROP.min(width), height: CROP.min(height) };
-            let place = Place { view: seen.place.view, crop: Some(tile) };
+            let place = Place { view, crop: Some(tile) };
             let apart = |other: &Place| {
                 other.view != place.view
                     || other.crop.is_none_or(|other| {
                         other.x.abs_diff(x) >= CROP / 2 || other.y.abs_diff(y) >= CROP / 2
                     })
             };
-            if crops.len() < self.crops && crops.iter().all(apart) {
+            if crops.iter().all(apart) {
                 crops.push(place);
             }
         }

@@ -2,7 +2,7 @@
 
 use super::shift::Shift;
 use super::values::{Ends, Values};
-use super::{CERTAIN, FACTOR, Fault, LEAST_VALUES, NOTABLE, STRONG, Warning};
+use super::{CERTAIN, FACTOR, Fault, NOTABLE, STRONG, Warning};
 use serde::{Deserialize, Serialize};
 
 /// Concordance of a − b with a + b less its neighbours from which a seems much noisier than b. Running means have
@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 const MUCH: f64 = 0.15;
 /// Standard errors from which it is worth to wait: p < 5·10⁻⁵, and there is one look.
 const DOUBTFUL: f64 = 4.5;
+/// Excess of noise of later running means from which their counts may be behind: it is 1.5 by one pass of equal ones.
+const AHEAD: f64 = 1.15;
 /// Standard errors that tell which of two faults it is, if it is one.
 const LIKELY: f64 = 2.0;
 
@@ -126,9 +128,38 @@ impl Energies {
     /// How many times the energy of the one the other has, if that is neither chance nor little; with z
     /// divided by what pixels that are not independent widen it by.
     fn excess(&self, widening: f64) -> Option<f64> {
+        self.excess_of(FACTOR, widening)
+    }
+
+    /// The same from another factor on.
+    fn excess_of(&self, least: f64, widening: f64) -> Option<f64> {
         let z = (self.other - self.one) / self.squares.sqrt() / widening;
         let factor = 1.0 / self.ratio();
-        (z > CERTAIN && factor > FACTOR).then_some(factor)
+        (z > CERTAIN && factor > least).then_some(factor)
+    }
+}
+
+/// A sum of differences, with what it is measured by.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Mean {
+    sum: f64,
+    squares: f64,
+}
+
+impl Mean {
+    pub(super) fn see(&mut self, difference: f64) {
+        self.sum += difference;
+        self.squares += difference * difference;
+    }
+
+    fn add(&mut self, more: &Self) {
+        self.sum += more.sum;
+        self.squares += more.squares;
+    }
+
+    /// Standard errors from 0.
+    fn z(&self) -> f64 {
+        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
     }
 }
 
@@ -139,6 +170,8 @@ pub(super) struct Sums {
     pub(super) batches: Concordance,
     /// The same without what all pixels of a tile have in common.
     pub(super) apart: Concordance,
+    /// Of a − c and b − d, each less that of the pixel beside it, of batches with more and more samples.
+    pub(super) totals: Concordance,
     /// Of a − b and a + b − 2c.
     pub(super) nested: Correlation,
     /// Of a − b and a + b less the same of its neighbours: is a noisier than b, by two batches alone?
@@ -150,6 +183,10 @@ pub(super) struct Sums {
     /// Noise of the smaller two batches, and of the larger two, each times what their numbers of samples make
     /// of it.
     pub(super) counts: Energies,
+    /// Squared differences of the first three running means, times what their numbers of samples make of the later one.
+    pub(super) early_steps: Energies,
+    /// Those differences themselves, likewise.
+    pub(super) fading: [Mean; 2],
     /// (a − b)² and (c − d)² of equal batches: steps of a running mean become smaller.
     pub(super) steps: Energies,
     /// (Σ(a − b))² of four watched pixels in a row, and Σ(a − b)².
@@ -163,12 +200,15 @@ impl Sums {
     pub(super) fn add(&mut self, more: &Self) {
         self.batches.add(&more.batches);
         self.apart.add(&more.apart);
+        self.totals.add(&more.totals);
         self.nested.add(&more.nested);
         self.early.add(&more.early);
         self.early_energies.iter_mut().zip(more.early_energies).for_each(|(sum, more)| *sum += more);
         self.neighbours.add(&more.neighbours);
         self.counts.add(&more.counts);
         self.steps.add(&more.steps);
+        self.early_steps.add(&more.early_steps);
+        self.fading.iter_mut().zip(&more.fading).for_each(|(sum, more)| sum.add(more));
         self.rows.iter_mut().zip(more.rows).for_each(|(sum, more)| *sum += more);
         self.ends.add(more.ends);
         self.shift.add(&more.shift);
@@ -210,7 +250,15 @@ impl Sums {
         self.early.value() > MUCH && self.z(&self.early) > by
     }
 
+    /// Whether batches that are said to have more and more samples seem to contain the ones before.
+    pub(super) fn may_be_totals(&self) -> bool {
+        self.z(&self.totals) > DOUBTFUL && self.totals.value() > STRONG / 2.0
+    }
+
     pub(super) fn fault(&self) -> Result<(), Fault> {
+        if self.z(&self.totals) > CERTAIN && self.totals.value() > STRONG {
+            return Err(Fault::Running { correlation: self.totals.value() });
+        }
         let (z, correlation) = self.of_batches();
         if z < CERTAIN || correlation < STRONG {
             return Ok(());
@@ -258,11 +306,20 @@ impl Sums {
         warnings.into_iter()
     }
 
+    /// How many times the noise, or the brightness, that their counts say later running means have beside the first, if
+    /// they seem to have more samples than they are said to have.
+    pub(super) fn behind(&self) -> Option<f64> {
+        if let Some(times) = self.early_steps.excess_of(AHEAD, self.widening()) {
+            return Some(times);
+        }
+        let [early, late] = self.fading;
+        let alike = (0.5..2.0).contains(&(early.sum / late.sum));
+        let fades = early.z() / self.widening() > CERTAIN && late.z() / self.widening() > LIKELY && alike;
+        fades.then_some(early.sum / late.sum)
+    }
+
     /// Noise that ends at 1, where nothing is above 1.
     pub(super) fn clipped(&self, values: &Values) -> Option<Warning> {
-        let Ends { noisy, at_white } = self.ends;
-        let share = at_white as f64 / noisy.max(1) as f64;
-        let said = !values.above_one && at_white >= LEAST_VALUES / 4 && share > 0.05;
-        said.then_some(Warning::Clipped(100.0 * share))
+        self.ends.clipped(values).map(Warning::Clipped)
     }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Values that differ by less, relative to their size, are the same but for rounding.
 const ROUNDING: f32 = 1.0 / (1 << 18) as f32;
-/// Second differences below this, relative to the pixels, are no noise.
+/// Differences below this, relative to the pixels, are no noise.
 const ROUGH: f32 = 1e-3;
 /// Fewest rough pixels of a tile that has noise.
 const LEAST_ROUGH: usize = 4;
@@ -35,8 +35,16 @@ pub(super) struct TileWatch {
     pub(super) batches: u64,
     /// Whether two batches came, the last of which looked noisy.
     pub(super) noisy: bool,
-    /// Whether a noisy batch came twice.
+    /// Whether a batch came twice that looks noisy.
     pub(super) repeated: bool,
+    /// Whether most pixels of a batch differed from those of the ones before: they have noise.
+    changes: bool,
+    /// Whether the same picture came of two numbers of samples: it has no noise.
+    still: bool,
+    /// Samples of the first batch.
+    size: u64,
+    /// Whether each of the first batches was said to have more samples than the one before.
+    pub(super) grows: bool,
     /// Whether values by themselves differ from batch to batch by more than rounding: they have noise.
     pub(super) varies: bool,
     /// What was found since the last check.
@@ -57,11 +65,61 @@ impl TileWatch {
     }
 
     pub(super) fn see(&mut self, spp: u64, light: Vec<[f32; 3]>) {
+        if let Some(last) = self.group.last() {
+            self.grows = spp > last.spp && (self.group.len() == 1 || self.grows);
+        }
         if !self.group.is_empty() && is_rough(&light) {
             self.noisy = true;
-            self.repeated |= self.group.iter().any(|seen| is_same(&seen.light, &light));
+            let alike: Vec<_> =
+                self.group.iter().map(|seen| (likeness(&seen.light, &light), seen.spp != spp)).collect();
+            alike.into_iter().for_each(|(likeness, another)| self.resembles(likeness, another));
+        }
+        if self.size == 0 {
+            self.size = spp;
         }
         self.group.push(WatchedBatch { spp, light });
+    }
+
+    /// Whether the first batch, if there is one, had as many samples.
+    pub(super) fn is_size(&self, spp: u64) -> bool {
+        self.size == 0 || self.size == spp
+    }
+
+    /// Whether a batch is to be held against the mean of those before.
+    pub(super) fn may_repeat(&self) -> bool {
+        self.repeated && !self.changes
+    }
+
+    /// Takes notice of how a batch of `spp` samples that looks noisy resembles the mean of those before.
+    pub(super) fn resembles_mean(&mut self, spp: u64, likeness: Likeness) {
+        self.resembles(likeness, spp != self.size);
+    }
+
+    /// Takes notice of how a batch that looks noisy resembles one before, which had another number of samples or not.
+    fn resembles(&mut self, likeness: Likeness, another_size: bool) {
+        self.repeated |= likeness == Likeness::Same;
+        self.still |= likeness == Likeness::Same && another_size;
+        self.changes |= likeness == Likeness::Other;
+    }
+
+    /// Whether the same random numbers came twice: pixels that differ from batch to batch were all the same in two.
+    pub(super) fn repeats_noise(&self) -> bool {
+        self.repeated && self.changes
+    }
+
+    /// Whether all that came is one picture of one number of samples, so that nothing tells whether it has noise.
+    pub(super) fn may_have_noise(&self) -> bool {
+        self.repeated && !self.changes && !self.still
+    }
+
+    /// The number of samples of each batch, if that is so.
+    pub(super) fn only_size(&self) -> Option<u64> {
+        self.may_have_noise().then_some(self.size)
+    }
+
+    /// Whether a picture has no noise here, or has it as it should.
+    pub(super) fn is_told(&self) -> bool {
+        self.still || self.varies || (self.changes && !self.repeated)
     }
 
     /// Takes notice of the values of a batch of the first group.
@@ -83,12 +141,41 @@ impl TileWatch {
         };
         if let [a, b, c, d] = &self.group[..] {
             four([a, b, c, d], shared, &mut found);
+            if self.batches == 4 {
+                totals([a, b, c], &mut found);
+            }
             self.group.clear();
-            self.first = Vec::new();
             self.first = Vec::new();
         }
         Some(found)
     }
+}
+
+/// How much of a batch is as in another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Likeness {
+    /// All of it, but for rounding.
+    Same,
+    /// Some pixels.
+    Part,
+    /// The fewest lit pixels, and rounding is not why.
+    Other,
+}
+
+fn likeness(one: &[[f32; 3]], other: &[[f32; 3]]) -> Likeness {
+    if is_same(one, other) {
+        return Likeness::Same;
+    }
+    let pixels = || one.iter().zip(other).map(|(one, other)| (one[1], other[1]));
+    let lit = pixels().filter(|(one, other)| one.max(*other) > 0.0).count();
+    let others =
+        pixels().filter(|(one, other)| (one - other).abs() > ROUGH * one.abs().max(other.abs())).count();
+    if 2 * others > lit { Likeness::Other } else { Likeness::Part }
+}
+
+/// Of two batches at the watched pixels, if the second looks noisy.
+pub(super) fn likeness_of_noise(before: &[[f32; 3]], now: &[[f32; 3]]) -> Option<Likeness> {
+    is_rough(now).then(|| likeness(before, now))
 }
 
 /// Whether most lit pixels differ from the line between their neighbours.
@@ -138,10 +225,7 @@ fn pair(a: &WatchedBatch, b: &WatchedBatch, shared: bool) -> Sums {
     };
     let (here, left) = (difference(1), difference(0));
     sums.neighbours = Correlation::of(here.iter().copied().zip(left));
-    for row in here.chunks(4) {
-        sums.rows[0] += row.iter().sum::<f64>().powi(2);
-        sums.rows[1] += energy(row);
-    }
+    add_rows(&here, &mut sums.rows);
     if !shared {
         let falls = a.light.iter().zip(&b.light).zip(weights(&[a, b], 1)).map(|((a, b), w)| {
             let [left, here, right] = std::array::from_fn(|place| f64::from(a[place]) + f64::from(b[place]));
@@ -181,6 +265,17 @@ fn four([a, b, c, d]: [&WatchedBatch; 4], shared: bool, sums: &mut Sums) {
         sums.apart = Concordance::of(apart, shared);
         sums.batches = Concordance::of(pairs(ac, bd), shared);
     }
+    if a.spp < b.spp && b.spp < c.spp && c.spp < d.spp {
+        // Noise of unlike numbers of samples is skewed unlike. That of two pixels that are alike is not
+        let beside = |one: &WatchedBatch, other: &WatchedBatch, i: usize| {
+            let at = |seen: &WatchedBatch| f64::from(seen.light[i][1]) - f64::from(seen.light[i][2]);
+            finite((at(one) - at(other)) * weights[i])
+        };
+        let (ac, bd): (Vec<f64>, Vec<f64>) =
+            (0..weights.len()).map(|i| (beside(a, c, i), beside(b, d, i))).unzip();
+        add_rows(&ac, &mut sums.rows);
+        sums.totals = Concordance::of(pairs(ac, bd), shared);
+    }
     if a.spp == b.spp && alike(b, c) {
         sums.nested = Correlation::of(ab.iter().copied().zip(combined([1.0, 1.0, -2.0, 0.0])));
     }
@@ -195,6 +290,34 @@ fn four([a, b, c, d]: [&WatchedBatch; 4], shared: bool, sums: &mut Sums) {
         energies.for_each(|(ab, cd)| sums.counts.see(first * ab, last * cd));
     } else if last < first && first <= NEAR * last {
         energies.for_each(|(ab, cd)| sums.counts.see(last * cd, first * ab));
+    }
+}
+
+/// The first running means of a picture, against each other: of batches a, b, c, those of a, of a and b, and of all.
+///
+/// If they are what their numbers of samples n, m, l say, they differ by σ²(1/n − 1/m) and σ²(1/m − 1/l). If each has k
+/// samples more, which the count does not know yet, by less in the beginning; and if a sum was divided by that count,
+/// they are brighter by k/n, k/m and k/l.
+fn totals([a, b, c]: [&WatchedBatch; 3], sums: &mut Sums) {
+    let weights = weights(&[a, b, c], 1);
+    let [first, second, third] = [a.spp as f64, b.spp as f64, c.spp as f64];
+    let (n, m, l) = (first, first + second, first + second + third);
+    let times = (1.0 / n - 1.0 / m) / (1.0 / m - 1.0 / l);
+    for (i, weight) in weights.into_iter().enumerate() {
+        let [a, b, c] = [a, b, c].map(|batch| f64::from(batch.light[i][1]));
+        let (two, three) = ((first * a + second * b) / m, (first * a + second * b + third * c) / l);
+        let (early, late) = (finite((a - two) * weight), finite((two - three) * weight));
+        sums.early_steps.see(early * early, times * late * late);
+        sums.fading[0].see(early);
+        sums.fading[1].see(times * late);
+    }
+}
+
+/// Differences in rows of four watched pixels, for [`Sums::rows`].
+fn add_rows(differences: &[f64], rows: &mut [f64; 2]) {
+    for row in differences.chunks(4) {
+        rows[0] += row.iter().sum::<f64>().powi(2);
+        rows[1] += energy(row);
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::display::luminance;
 use crate::rgb::Rgb;
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Share of a tile's pixels that may be non-finite. The film keeps single ones out, and the report counts
@@ -45,8 +44,8 @@ pub enum ImpossibleLight {
 /// ```
 ///
 /// Single channels may be negative: colours outside Rec.709 are. Luminance is not, but for rounding, whose
-/// scale is that of the brightest pixel seen.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+/// scale is that of the brightest pixel that was accepted so far.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct LightCheck {
     brightest: f64,
 }
@@ -61,24 +60,19 @@ impl LightCheck {
     }
 
     /// Whether most pixels are finite, and the light of those on average not less than none.
-    pub(super) fn check_all(&mut self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
-        self.check_seen(SeenLight::of(pixels))
-    }
-
-    /// The same of pixels that were looked at.
-    pub(super) fn check_seen(&mut self, seen: SeenLight) -> Result<(), ImpossibleLight> {
-        let SeenLight { sum, finite, all, brightest } = seen;
-        self.brightest = self.brightest.max(brightest);
-        let lost = (all - finite) as f64 / all.max(1) as f64;
-        if lost > MOST_NON_FINITE {
-            return Err(ImpossibleLight::NotFinite { percent: 100.0 * lost });
-        }
-        let mean = sum / finite.max(1) as f64;
-        if mean < -ROUNDING * self.brightest - f64::from(f32::EPSILON) {
-            return Err(ImpossibleLight::Negative { mean });
-        }
+    fn check_all(&mut self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
+        let seen = SeenLight::of(pixels);
+        let brightest = self.brightest.max(seen.brightest);
+        seen.check(brightest)?;
+        // Light that was refused is no measure of what comes later
+        self.brightest = brightest;
         Ok(())
     }
+}
+
+/// Whether most pixels are finite, and the light of those on average not less than none.
+pub(crate) fn check(pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
+    SeenLight::of(pixels).by_itself()
 }
 
 /// What there is to see in pixels of a tile, apart from all others: luminance, where it is finite.
@@ -102,6 +96,30 @@ impl SeenLight {
             }
         }
         seen
+    }
+
+    /// Beside the brightest pixel that there is to compare with.
+    fn check(self, brightest: f64) -> Result<(), ImpossibleLight> {
+        let Self { sum, finite, all, .. } = self;
+        let lost = (all - finite) as f64 / all.max(1) as f64;
+        if lost > MOST_NON_FINITE {
+            return Err(ImpossibleLight::NotFinite { percent: 100.0 * lost });
+        }
+        let mean = sum / finite.max(1) as f64;
+        if mean < -ROUNDING * brightest - f64::from(f32::EPSILON) {
+            return Err(ImpossibleLight::Negative { mean });
+        }
+        Ok(())
+    }
+
+    /// Beside its own brightest pixel.
+    pub(super) fn by_itself(self) -> Result<(), ImpossibleLight> {
+        self.check(self.brightest)
+    }
+
+    /// Whether there was anything to see.
+    pub(super) fn is_of_nothing(self) -> bool {
+        self.all == 0
     }
 }
 

@@ -5,13 +5,13 @@ mod report;
 
 pub use denoised::DenoisedJob;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use noisefloor::descriptor::Described;
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     criterion::ExpectedThreshold,
     evidence::{Evidence, Samples},
-    stills::{SnapshotPair, Still},
+    stills::{SnapshotPair, Still, StillWarning},
 };
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::start_threads;
@@ -89,22 +89,9 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
             "note: the pictures share samples, as snapshots of one rendering do, and are judged as --nested; --independent overrides this"
         );
     }
-    let unlike = held.unlike_tiles(grid);
-    let count = unlike.iter().filter(|unlike| **unlike).count();
-    if count == grid.len() {
-        bail!(
-            "the pictures differ in brightness by more than noise explains, everywhere: they are no two renderings \
-             of one view with one exposure, and their difference says nothing about noise"
-        );
-    }
-    if count > 0 {
-        note!(
-            "warning: in {count} of {} tiles the pictures differ in brightness by more than noise explains, and \
-             these are not judged; compare renderings of one view with one exposure",
-            grid.len()
-        );
-    }
-    warn_of(&held);
+    let noticed = held.notice(grid)?;
+    warn_of(&noticed.warnings);
+    let unlike = noticed.unlike;
     let described = held.describe(&job.oracle, grid)?;
     let rows = judge(job, grid, (image.spp, &described), &unlike)?;
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
@@ -136,8 +123,8 @@ pub(crate) fn warn_unread(path: &Path, options: &ReadOptions) -> anyhow::Result<
 }
 
 /// Says what is likely wrong with two pictures.
-fn warn_of(pair: &SnapshotPair<'_>) {
-    for what in pair.warnings() {
+fn warn_of(warnings: &[StillWarning]) {
+    for what in warnings {
         note!("warning: {what}");
     }
 }

@@ -223,6 +223,9 @@ impl<'a> Tune<'a> {
             (Some((.., whole)), Some(crop)) => whole.cropped(crop),
             _ => view.pictures.pair(look.each, look.crop, &bar)?,
         };
+        if look.crop.is_none() {
+            view.check_size(&pair)?;
+        }
         self.rendering += start.elapsed();
         bar.set_message(format!("{what}: judging"));
         let start = Instant::now();

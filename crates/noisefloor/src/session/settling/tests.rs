@@ -179,7 +179,7 @@ impl StoppingCriterion for ByExposure {
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
         let verdict = |tile: &Tile| {
             let need = if tile.index == 0 { 400 } else { (8.0 * view.display.exposure() / 0.18) as u64 };
-            let probability = 1.0 / view.display.exposure();
+            let probability = 0.1 / view.display.exposure();
             Verdict::new(view.film.spp(tile.index) >= need)
                 .expecting(Some(need.max(view.film.spp(tile.index) + 1)))
                 .with_probability(probability)
@@ -209,7 +209,7 @@ fn what_stopped_under_another_exposure_is_looked_at_again() {
     }
     assert!(stops.iter().any(|stop| stop.tile.index == 1 && stop.spp > 40), "{stops:?}");
     // All verdicts that stand are of one exposure
-    let now = 1.0 / session.display().unwrap().exposure();
+    let now = 0.1 / session.display().unwrap().exposure();
     assert!(
         session.stops().all(|stop| stop.probability == Some(now)),
         "{:?}, {now}",

@@ -75,7 +75,7 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
              the earlier one. Render one with another seed and denoise it again; --independent overrides what was found"
         );
     }
-    warn_of(&pair);
+    warn_of(&pair.notice(TileGrid::new(a.size.0, a.size.1, job.tile)?)?.warnings);
     if a.spp.max(b.spp) > 2.0 * a.spp.min(b.spp) {
         note!(
             "note: one picture has more than twice the samples of the other ({} and {}): the verdict is on the mean of the two \

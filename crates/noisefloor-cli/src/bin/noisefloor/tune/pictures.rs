@@ -5,7 +5,7 @@ use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use noisefloor::display::Display;
 use noisefloor::source::SourceIdentity;
-use noisefloor::stills::StillError;
+use noisefloor::stills::{StillError, StillWarning};
 use noisefloor::tune::{Excess, Knob, PicturePair, most_in_squares};
 use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
 use noisefloor_cli::options::tone::Tone;
@@ -16,6 +16,7 @@ use noisefloor_denoise::{
 };
 use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
 use std::fs::File;
+use std::mem::discriminant;
 use std::time::Duration;
 
 /// Samples per pixel between two looks at the signals.
@@ -82,6 +83,8 @@ pub struct View {
     pub pictures: Pictures,
     /// Albedo and normals for the denoiser, of each half.
     pub guides: Option<Guides>,
+    /// Of the first pictures.
+    size: Option<(usize, usize)>,
 }
 
 impl View {
@@ -92,7 +95,21 @@ impl View {
             Some(denoiser) => pictures.guides(source.first_hits_spp(), denoiser)?,
             None => None,
         };
-        Ok(Self { frame, source, pictures, guides })
+        Ok(Self { frame, source, pictures, guides, size: None })
+    }
+
+    /// Checks that whole pictures keep the size that they had with the settings before.
+    pub fn check_size(&mut self, pair: &Pair) -> anyhow::Result<()> {
+        let ((width, height), before) = (pair.size, *self.size.get_or_insert(pair.size));
+        if pair.size != before {
+            bail!(
+                "the renderer's pictures have {width}×{height} pixels now, and had {}×{} before: what is seen in one says \
+                 nothing of the other; render all with one size",
+                before.0,
+                before.1
+            );
+        }
+        Ok(())
     }
 
     /// What the pictures and what is found in them depend on.
@@ -253,8 +270,8 @@ pub struct Judges<'a> {
     criterion: &'a TuneCriterion,
     params: Params,
     denoiser: Option<Oidn>,
-    /// The first pair warns.
-    warned: bool,
+    /// What was said of the pictures, each kind once.
+    warned: Vec<StillWarning>,
 }
 
 impl<'a> Judges<'a> {
@@ -266,7 +283,7 @@ impl<'a> Judges<'a> {
                 Some(Oidn::start(plan)?)
             }
         };
-        Ok(Self { criterion, params, denoiser, warned: false })
+        Ok(Self { criterion, params, denoiser, warned: Vec::new() })
     }
 
     /// How parts of a picture are displayed: as the whole.
@@ -325,8 +342,12 @@ impl<'a> Judges<'a> {
             other => other.into(),
         })?;
         let compared = halves.compare(&params);
-        if !std::mem::replace(&mut self.warned, true) {
-            compared.warnings().iter().for_each(|warning| note!("warning: {warning}"));
+        for warning in halves.notice(&params)? {
+            let known = |known: &StillWarning| discriminant(known) == discriminant(&warning);
+            if !self.warned.iter().any(known) {
+                note!("warning: {warning}");
+                self.warned.push(warning);
+            }
         }
         let display = compared.display().clone();
         let spp = spp.map(|each| 2.0 * each);
