@@ -79,13 +79,13 @@
 // The search goes on.
 #define NF_TUNING_SEARCHING 0
 
-// In the mean of the last two pictures nothing is seen that should not be: setting is just enough.
+// One picture with this setting shows nothing that should not be seen.
 #define NF_TUNING_FOUND 1
 
 // Even the finest setting is not enough.
 #define NF_TUNING_AT_FINEST 2
 
-// Finer settings give the same pictures: the renderer ignores the setting, or reaches another limit first.
+// Settings down to the finest give the same pictures: the renderer ignores the setting, or reaches another limit first.
 #define NF_TUNING_UNCHANGED 3
 
 // More samples do not make it better: what is wrong is no noise, or the pictures are not independent.
@@ -273,8 +273,8 @@ typedef struct {
     // While searching: what two pictures are to be rendered with, each with a seed of its own, the same seeds in
     // every step.
     double each;
-    // While searching: one picture with this setting is as good as the mean of the two. At NF_TUNING_FOUND: the
-    // setting that is just enough.
+    // While searching: one picture with this setting is as good as the mean of the two, if noise follows the setting. At
+    // NF_TUNING_FOUND: the setting that is enough.
     double setting;
 } NfTuningStep;
 
@@ -287,9 +287,10 @@ typedef struct {
     uint32_t y;
     // A number that follows from the pictures, by which settings without effect are noticed; 0 if it is not known.
     uint64_t pictures;
-    // The noise of each picture, in a unit that is the same in all steps, by which thresholds are noticed that do not govern
-    // it; 0 if it is not known.
-    double noise;
+    // The same ratio of one picture whose threshold is finer by the root of two: that of the mean where the samples of pixels
+    // follow the threshold, and at most 1.41 times that where they do not. 0 if it is not known: then only pictures that were
+    // rendered speak for a setting.
+    double alone;
 } NfExcess;
 
 #ifdef __cplusplus
@@ -645,7 +646,8 @@ NfStatus nf_tuning_of_samples(uint64_t least, uint64_t most, NfTuning **tuning);
 // What to render next, or how the search ended. The same until nf_tuning_tell.
 NfStatus nf_tuning_next(const NfTuning *tuning, NfTuningStep *step);
 
-// Says what was found of the two pictures that nf_tuning_next asked for.
+// Says what was found of the two pictures that nf_tuning_next asked for, once. NF_STATUS_ARGUMENT if it has not asked since, and
+// for ratios that are negative or not a number.
 NfStatus nf_tuning_tell(const NfTuning *tuning, NfExcess excess);
 
 // Frees a search. NULL is ignored, a second time is NF_STATUS_HANDLE.

@@ -852,9 +852,18 @@ fn a_threshold_is_found() {
             let status = nf_excess(oracle, &by_srgb, width, height, a, b, floats, &mut last);
             assert_eq!(status, NfStatus::Ok, "{}", message());
             assert!(last.x < width && last.y < height && last.pictures != 0);
+            for wrong in [f64::NAN, -1.0] {
+                assert_eq!(nf_tuning_tell(tuning, NfExcess { ratio: wrong, ..last }), NfStatus::Argument);
+                assert_eq!(nf_tuning_tell(tuning, NfExcess { alone: wrong, ..last }), NfStatus::Argument);
+            }
             assert_eq!(nf_tuning_tell(tuning, last), NfStatus::Ok);
+            // Once
+            assert_eq!(nf_tuning_tell(tuning, last), NfStatus::Argument);
         }
-        assert!(step.ending == NF_TUNING_FOUND && last.ratio <= 1.0 && last.ratio > 0.5, "{step:?} {last:?}");
+        // One of both is enough
+        let of_each = last.ratio * 2f64.sqrt();
+        assert!(step.ending == NF_TUNING_FOUND && of_each <= 1.0 && of_each > 0.6, "{step:?} {last:?}");
+        assert_eq!(nf_tuning_tell(tuning, last), NfStatus::Argument);
         assert_eq!((nf_tuning_free(tuning), nf_tuning_free(tuning)), (NfStatus::Ok, NfStatus::Handle));
 
         let (a, b) = (render(0.1, 1), render(0.1, 2));

@@ -13,17 +13,23 @@ use std::sync::{Mutex, PoisonError};
 
 /// The search goes on.
 pub const NF_TUNING_SEARCHING: u32 = 0;
-/// In the mean of the last two pictures nothing is seen that should not be: setting is just enough.
+/// One picture with this setting shows nothing that should not be seen.
 pub const NF_TUNING_FOUND: u32 = 1;
 /// Even the finest setting is not enough.
 pub const NF_TUNING_AT_FINEST: u32 = 2;
-/// Finer settings give the same pictures: the renderer ignores the setting, or reaches another limit first.
+/// Settings down to the finest give the same pictures: the renderer ignores the setting, or reaches another limit first.
 pub const NF_TUNING_UNCHANGED: u32 = 3;
 /// More samples do not make it better: what is wrong is no noise, or the pictures are not independent.
 pub const NF_TUNING_NOT_FALLING: u32 = 4;
 
 /// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
-pub struct NfTuning(Mutex<Tuning>);
+pub struct NfTuning(Mutex<Asked>);
+
+/// And whether it was asked since it was told.
+struct Asked {
+    tuning: Tuning,
+    asked: bool,
+}
 
 impl handle::Handle for NfTuning {
     const NAME: &str = "tuning";
@@ -38,8 +44,8 @@ pub struct NfTuningStep {
     /// While searching: what two pictures are to be rendered with, each with a seed of its own, the same seeds in
     /// every step.
     pub each: f64,
-    /// While searching: one picture with this setting is as good as the mean of the two. At NF_TUNING_FOUND: the
-    /// setting that is just enough.
+    /// While searching: one picture with this setting is as good as the mean of the two, if noise follows the setting. At
+    /// NF_TUNING_FOUND: the setting that is enough.
     pub setting: f64,
 }
 
@@ -54,9 +60,10 @@ pub struct NfExcess {
     pub y: u32,
     /// A number that follows from the pictures, by which settings without effect are noticed; 0 if it is not known.
     pub pictures: u64,
-    /// The noise of each picture, in a unit that is the same in all steps, by which thresholds are noticed that do not govern
-    /// it; 0 if it is not known.
-    pub noise: f64,
+    /// The same ratio of one picture whose threshold is finer by the root of two: that of the mean where the samples of pixels
+    /// follow the threshold, and at most 1.41 times that where they do not. 0 if it is not known: then only pictures that were
+    /// rendered speak for a setting.
+    pub alone: f64,
 }
 
 impl From<KnobError> for Failure {
@@ -87,7 +94,12 @@ pub unsafe extern "C" fn nf_tuning_of_samples(least: u64, most: u64, tuning: *mu
 /// As [`handle::give`].
 unsafe fn give(place: *mut *mut NfTuning, knob: Knob) -> Result<(), Failure> {
     // SAFETY: as for this function.
-    unsafe { handle::give(place, || Ok(NfTuning(Mutex::new(Tuning::new(knob)?)))) }
+    unsafe {
+        handle::give(place, || {
+            let tuning = Tuning::new(knob)?;
+            Ok(NfTuning(Mutex::new(Asked { tuning, asked: false })))
+        })
+    }
 }
 
 /// What to render next, or how the search ended. The same until nf_tuning_tell.
@@ -95,7 +107,12 @@ unsafe fn give(place: *mut *mut NfTuning, knob: Knob) -> Result<(), Failure> {
 pub unsafe extern "C" fn nf_tuning_next(tuning: *const NfTuning, step: *mut NfTuningStep) -> NfStatus {
     guard(|| {
         let tuning = handle::get(tuning)?;
-        let next = tuning.0.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let next = {
+            let mut asked = tuning.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let next = asked.tuning.next();
+            asked.asked = matches!(next, Next::Render { .. });
+            next
+        };
         let over = |ending| NfTuningStep { ending, ..NfTuningStep::default() };
         let next = match next {
             Next::Render { each, setting } => NfTuningStep { ending: NF_TUNING_SEARCHING, each, setting },
@@ -109,14 +126,30 @@ pub unsafe extern "C" fn nf_tuning_next(tuning: *const NfTuning, step: *mut NfTu
     })
 }
 
-/// Says what was found of the two pictures that nf_tuning_next asked for.
+/// Says what was found of the two pictures that nf_tuning_next asked for, once. NF_STATUS_ARGUMENT if it has not asked since, and
+/// for ratios that are negative or not a number.
 #[unsafe(no_mangle)]
 pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> NfStatus {
     guard(|| {
-        let NfExcess { ratio, x, y, pictures, noise } = excess;
+        let NfExcess { ratio, x, y, pictures, alone } = excess;
+        for (name, value) in [("ratio", ratio), ("alone", alone)] {
+            if value.is_nan() || value < 0.0 {
+                let what = "0 or more, or infinite where it cannot be told";
+                return Err(Failure::new(
+                    NfStatus::Argument,
+                    format!("excess.{name} must be {what}, not {value}"),
+                ));
+            }
+        }
         let place = Some((x as usize, y as usize));
-        let excess = Excess { place, pictures, noise, ..Excess::new(ratio) };
-        handle::get(tuning)?.0.lock().unwrap_or_else(PoisonError::into_inner).tell(excess);
+        let alone = (alone > 0.0).then_some(alone);
+        let tuning = handle::get(tuning)?;
+        let mut asked = tuning.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if !std::mem::take(&mut asked.asked) {
+            let what = "nf_tuning_tell answers nf_tuning_next, once; after the end there is nothing to tell";
+            return Err(Failure::new(NfStatus::Argument, what.to_owned()));
+        }
+        asked.tuning.tell(Excess { place, pictures, alone, ..Excess::new(ratio) });
         Ok(())
     })
 }
@@ -253,8 +286,9 @@ unsafe fn pictures<const N: usize>(
 /// # Safety
 /// As [`border::write`].
 unsafe fn write(place: *mut NfExcess, excess: Excess) -> Result<(), Failure> {
-    let Excess { ratio, place: at, pictures, noise } = excess;
+    let Excess { ratio, place: at, pictures, alone } = excess;
     let (x, y) = at.unwrap_or_default();
+    let alone = alone.unwrap_or(0.0);
     // SAFETY: as for this function.
-    unsafe { border::write(place, NfExcess { ratio, x: x as u32, y: y as u32, pictures, noise }, "excess") }
+    unsafe { border::write(place, NfExcess { ratio, x: x as u32, y: y as u32, pictures, alone }, "excess") }
 }

@@ -10,6 +10,7 @@ import os
 import pathlib
 import sys
 import tempfile
+import types
 import unittest
 import zipfile
 
@@ -831,13 +832,197 @@ class Addon(unittest.TestCase):
             bpy.ops.render.noisefloor_threshold()
         self.assertEqual(facts(scene), before)
 
+    def test_what_one_picture_leaves_follows_from_the_samples_that_pixels_have(self):
+        class Excess:
+            def squares(self):
+                return [(0, 0, 64, 64, 0.8), (64, 0, 64, 64, 0.6)]
+
+        random = numpy.random.default_rng(2)
+
+        def left(counts):
+            pair = [
+                {"Combined": numpy.float32(random.normal(0.5, 0.1, (64, 128, 4))), frame.COUNT: count}
+                for count in counts
+            ]
+            return tune.alone(Excess(), pair, 48, 4096)
+
+        def count(first, second):
+            made = numpy.full((64, 128, 1), first, numpy.float32)
+            made[::2] = second
+            return made
+
+        # All have the fewest, or the most, samples; all have more; and every other row has
+        for counts, times in [((48, 48), 2), ((4096, 4096), 2), ((64, 640), 1), ((48, 64), 1.5)]:
+            self.assertAlmostEqual(left([count(*counts)] * 2) / 0.8, times**0.5, delta=0.03)
+        # A place that is better, but whose pixels have the fewest, is worse alone
+        part = count(64, 64)
+        part[:, 64:] = 48
+        self.assertAlmostEqual(left([part, part]), 0.6 * 2**0.5, delta=0.01)
+
+    def test_what_one_picture_leaves_is_what_it_leaves(self):
+        """Predicted of a finer threshold, and looked at."""
+        scene, params = room(closed=True), None
+        scene.noisefloor.use, scene.cycles.samples, scene.cycles.use_adaptive_sampling = False, 4096, True
+        scene.view_layers[0].cycles.pass_debug_sample_count = True
+        params = settings.params(scene, display.table(scene))
+
+        def pair(threshold):
+            scene.cycles.adaptive_threshold, found = threshold, []
+            for scene.cycles.seed in (31, 32):
+                with Passes() as plain:
+                    bpy.ops.render.render()
+                (found_passes,) = plain.cycles["ViewLayer"]
+                found_passes[frame.COUNT] = sampling.counts(found_passes[frame.COUNT], 0, threshold, 4096)
+                found.append(found_passes)
+            return found, noisefloor.excess(*(each["Combined"][..., :3] for each in found), params=params)
+
+        pictures, coarse = pair(0.03)
+        said = tune.alone(coarse, pictures, sampling.least(0, 0.03, 4096), 4096)
+        self.assertTrue(coarse.ratio <= said < 2**0.5 * coarse.ratio, (coarse.ratio, said))
+        _, fine = pair(0.03 / 2**0.5)
+        # Of one picture, √2 times what their mean has; seeds differ
+        self.assertAlmostEqual(numpy.log(fine.ratio * 2**0.5 / said), 0, delta=0.25)
+
+    def test_a_denoise_node_that_follows_is_noticed(self):
+        scene = room()
+        self.assertFalse(compositor.denoises(scene))
+        if hasattr(scene, "compositing_node_group"):
+            tree = scene.compositing_node_group = bpy.data.node_groups.new("after", "CompositorNodeTree")
+            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+            out = tree.nodes.new("NodeGroupOutput")
+        else:
+            scene.use_nodes = True
+            tree, out = scene.node_tree, scene.node_tree.nodes["Composite"]
+        scene.render.use_compositing = True
+        node = tree.nodes.new("CompositorNodeDenoise")
+        self.assertFalse(compositor.denoises(scene), "nobody sees what it makes")
+        tree.links.new(node.outputs[0], out.inputs[0])
+        self.assertTrue(compositor.denoises(scene))
+        for off in (lambda yes: setattr(node, "mute", yes), lambda yes: setattr(scene.render, "use_compositing", not yes)):
+            off(True)
+            self.assertFalse(compositor.denoises(scene))
+            off(False)
+        advice = "A" + compositor.ADVICE[1:]
+        self.assertIn(advice, [text for _, text in drawn(scene)])
+        scene.cycles.use_denoising = True
+        self.assertNotIn(advice, [text for _, text in drawn(scene)])
+
+    def test_the_panel_offers_the_loop_first_and_says_how_far_a_search_is(self):
+        scene = room()
+        scene.cycles.use_adaptive_sampling = True
+        # Of other tests
+        hooks.state.took.clear()
+        self.assertEqual(
+            [text for _, text in drawn(scene)],
+            [
+                "Still: Render until nobody sees noise",
+                "Animation: Find Noise Threshold",
+                "Takes two to three frames",
+            ],
+        )
+        scene.noisefloor.use = False
+        bpy.ops.render.render()
+        self.assertRegex(drawn(scene)[2][1], r"^Takes two to three frames, about 0:\d\d to 0:\d\d$")
+        self.assertFalse(bpy.ops.render.noisefloor_stop.poll())
+        shares, take = [], tune.Search.take
+
+        def record(self):
+            take(self)
+            hooks.state.search = self
+            shares.append((len(self.search.steps), self.share(), self.left()))
+            said = drawn(scene)
+            assert [kind for kind, _ in said[:3]] == ["prop", "progress", "operator"], said
+            assert "picture" in said[1][1], said
+            hooks.state.search = None
+
+        tune.Search.take = record
+        scene.cycles.samples = 4096
+        try:
+            bpy.ops.render.noisefloor_threshold()
+        finally:
+            tune.Search.take = take
+        self.assertGreater(len(shares), 1)
+        self.assertTrue(all(0 <= share <= 1 for _, share, _ in shares), shares)
+        self.assertTrue(all(left is None or left >= 0 for *_, left in shares), shares)
+        self.assertEqual(shares[-1][1:], (0.0, None))
+
+    def test_gpus_are_used_as_the_scene_says(self):
+        """By fakes: there is no GPU here."""
+        scene, real = room(), denoise.gpu
+        scene.cycles.use_denoising = scene.cycles.denoising_use_gpu = True
+        self.assertIsNone(denoise.gpu(scene))
+        library = denoise.library()
+        if library is None:
+            self.skipTest("this Blender has no Open Image Denoise")
+        self.assertEqual(denoise.device(scene, library), (denoise.CPU, None))
+        denoise.gpu = lambda scene: "CUDA"
+        try:
+            kind, note = denoise.device(scene, library)
+            self.assertEqual(kind, denoise.CPU)
+            self.assertIn("the processor denoises: Open Image Denoise", note)
+            scene.render.resolution_x, scene.render.resolution_y = 640, 480
+            self.assertEqual(len(looks(tune.Search(scene))), 1, "the whole again and again")
+        finally:
+            denoise.gpu = real
+        self.assertGreater(len(looks(tune.Search(scene))), 1)
+        # What a GPU gets by way of its own memory is what the processor reads where it is
+        random = numpy.random.default_rng(4)
+        picture = numpy.float32(random.uniform(0, 1, (64, 96, 3)))
+        device = denoise._Device(library, denoise.CPU)
+        both = [device.run({"color": picture}, "color", ["hdr"], shared) for shared in (True, False)]
+        numpy.testing.assert_array_equal(*both)
+        self.assertGreater(numpy.abs(both[0] - picture).mean(), 0.01)
+
+
+def looks(search):
+    """The sizes of what a search looks at until the third picture is to be rendered, of fakes."""
+    search.end()
+    sizes = []
+    while search.look is not None and len(sizes) < 8:
+        sizes.append(search.look.crop)
+        random = numpy.random.default_rng(len(sizes))
+        pair = [
+            numpy.float32(random.normal(0.5, 0.3, (*search.size[::-1], 3))) for _ in range(2)
+        ]
+        excess = noisefloor.excess(*pair, params=search.judge.params)
+        search.search.tell(excess)
+        search.look = search.search.next()
+    return set(sizes)
+
+
+def drawn(scene):
+    """What the panel draws beside Cycles' own field: kinds and texts."""
+    said = []
+
+    class Layout:
+        def column(self, **_):
+            return self
+
+        row = column
+
+        def prop(self, owner, name, text=None):
+            said.append(("prop", text or name))
+
+        def operator(self, name, text="", icon=""):
+            said.append(("operator", text))
+
+        def label(self, text, icon=""):
+            said.append(("label", text))
+
+        def progress(self, factor, text):
+            said.append(("progress", text))
+
+    panel, context = types.SimpleNamespace(layout=Layout()), types.SimpleNamespace(scene=scene)
+    tune.draw(panel, context)
+    return said
+
 
 arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
 zipfile.ZipFile(arguments[0]).extractall(FOLDER)
 sys.path.insert(0, str(FOLDER))
 import noisefloor_addon
 import noisefloor
-from noisefloor_addon import denoise, display, frame, hooks, judging, passes, sampling, settings
+from noisefloor_addon import compositor, denoise, display, frame, hooks, judging, passes, sampling, settings, tune
 
 noisefloor_addon.register()
 result = unittest.main(argv=["test_addon.py", *arguments[1:]], exit=False).result

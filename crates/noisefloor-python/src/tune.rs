@@ -77,16 +77,53 @@ impl PyExcess {
 ///         tuning.tell(noisefloor.excess(render(each, seed=1), render(each, seed=2)))
 ///     print(tuning.ending, tuning.setting)
 ///
-/// The mean of the last two pictures is as good as one with the setting found.
+/// One picture with the setting found shows nothing that should not be seen: two with it were looked at, and of a threshold each of
+/// them is good enough; or alone (see tell) says so.
 ///
-/// Raises ParameterError if the range is empty.
+/// Raises ParameterError if the range is empty, or wider than 10⁹.
 #[pyclass(frozen, name = "Tuning", module = "noisefloor")]
-pub(crate) struct PyTuning(Mutex<Tuning>);
+pub(crate) struct PyTuning(Mutex<Asked<Tuning>>);
 
-impl PyTuning {
-    fn lock(&self) -> MutexGuard<'_, Tuning> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+/// A search, and whether it was asked since it was told.
+struct Asked<T> {
+    search: T,
+    asked: bool,
+}
+
+impl<T> Asked<T> {
+    fn new(search: T) -> Mutex<Self> {
+        Mutex::new(Self { search, asked: false })
     }
+
+    /// It is to be told what it asked for, once.
+    fn told(&mut self) -> PyResult<&mut T> {
+        if std::mem::take(&mut self.asked) {
+            return Ok(&mut self.search);
+        }
+        Err(ParameterError::new_err(
+            "tell() answers next(), once: call next(), render what it returns, and tell what was found; after the end there is \
+             nothing to tell",
+        ))
+    }
+}
+
+fn lock<T>(search: &Mutex<T>) -> MutexGuard<'_, T> {
+    search.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A number of how much is left, not negative.
+fn ratio(name: &str, value: f64) -> PyResult<f64> {
+    if value >= 0.0 {
+        return Ok(value);
+    }
+    Err(ParameterError::new_err(format!(
+        "{name} is what is wrong over what may be wrong: 0 or more, or infinity where it cannot be told, not {value}"
+    )))
+}
+
+/// With what is known of one picture.
+fn with_alone(excess: Excess, alone: Option<f64>) -> PyResult<Excess> {
+    Ok(Excess { alone: alone.map(|alone| ratio("alone", alone)).transpose()?, ..excess })
 }
 
 fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Tuning> {
@@ -128,8 +165,7 @@ impl PyTuning {
     #[new]
     #[pyo3(signature = (*, threshold = None, samples = None))]
     fn new(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Self> {
-        let tuning = begin(threshold, samples)?;
-        Ok(Self(Mutex::new(tuning)))
+        Ok(Self(Asked::new(begin(threshold, samples)?)))
     }
 
     /// next() --
@@ -137,41 +173,54 @@ impl PyTuning {
     /// What two pictures are to be rendered with, each with a seed of its own, the same seeds in every step; None at the
     /// end. The same until tell().
     fn next(&self) -> Option<f64> {
-        match self.lock().next() {
-            Next::Render { each, .. } => Some(each),
+        let mut tuning = lock(&self.0);
+        match tuning.search.next() {
+            Next::Render { each, .. } => {
+                tuning.asked = true;
+                Some(each)
+            }
             Next::Done(_) => None,
         }
     }
 
-    /// tell(excess) --
+    /// tell(excess, *, alone=None) --
     ///
-    /// What was found of the two pictures: an Excess, or its ratio.
-    fn tell(&self, excess: ExcessLike<'_>) {
+    /// What was found of the two pictures that next() has asked for: an Excess, or its ratio.
+    ///
+    /// alone: the ratio of one picture whose threshold is finer by the root of two, if it is known how the samples of pixels follow
+    ///     the threshold: that of the mean where they do, and at most 1.41 times that where they do not. None: only pictures that
+    ///     were rendered speak for a setting.
+    ///
+    /// Raises ParameterError for a ratio that is negative or not a number, and for what was not asked for.
+    #[pyo3(signature = (excess, *, alone = None))]
+    fn tell(&self, excess: ExcessLike<'_>, alone: Option<f64>) -> PyResult<()> {
         let excess = match excess {
             ExcessLike::Whole(whole) => whole.excess,
-            ExcessLike::Ratio(ratio) => Excess::new(ratio),
+            ExcessLike::Ratio(value) => Excess::new(ratio("an excess", value)?),
         };
-        self.lock().tell(excess);
+        let excess = with_alone(excess, alone)?;
+        lock(&self.0).told()?.tell(excess);
+        Ok(())
     }
 
-    /// How it ended: "found", "at-finest" (even the finest setting is not enough), "unchanged" (finer settings give
-    /// the same pictures), or "not-falling" (more samples do not make it better); None before that.
+    /// How it ended: "found", "at-finest" (even the finest setting is not enough), "unchanged" (settings down to the
+    /// finest give the same pictures), or "not-falling" (more samples do not make it better); None before that.
     #[getter]
     fn ending(&self) -> Option<&'static str> {
-        ending(self.lock().next())
+        ending(lock(&self.0).search.next())
     }
 
     /// The setting that is just enough; None unless one was found.
     #[getter]
     fn setting(&self) -> Option<f64> {
-        setting(self.lock().next())
+        setting(lock(&self.0).search.next())
     }
 
     /// What was tried: (setting, ratio) of each step. One picture with the setting is as good as the mean of the two
-    /// that were rendered for it.
+    /// that were rendered for it, if noise follows the setting.
     #[getter]
     fn steps(&self) -> Vec<(f64, f64)> {
-        steps(&self.lock())
+        steps(&lock(&self.0).search)
     }
 }
 
@@ -198,13 +247,7 @@ pub(crate) struct PyLook {
 ///
 /// Raises ParameterError if the range is empty.
 #[pyclass(frozen, name = "Search", module = "noisefloor")]
-pub(crate) struct PySearch(Mutex<Search>);
-
-impl PySearch {
-    fn lock(&self) -> MutexGuard<'_, Search> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
+pub(crate) struct PySearch(Mutex<Asked<Search>>);
 
 #[pymethods]
 impl PySearch {
@@ -220,50 +263,58 @@ impl PySearch {
             return Err(ParameterError::new_err(format!("views must be 1 to {MOST_VIEWS}, not {views}")));
         }
         let crops = size.map_or(0, crops_for);
-        Ok(Self(Mutex::new(Search::new(begin(threshold, samples)?, views, crops))))
+        Ok(Self(Asked::new(Search::new(begin(threshold, samples)?, views, crops))))
     }
 
     /// next() --
     ///
     /// The next Look; None at the end. The same until tell().
     fn next(&self) -> Option<PyLook> {
-        self.lock().next().map(|Look { each, view, crop, is_rendered, .. }| {
+        let mut search = lock(&self.0);
+        let look = search.search.next();
+        search.asked = look.is_some();
+        look.map(|Look { each, view, crop, is_rendered, .. }| {
             let crop = crop.map(|crop| (crop.x, crop.y, crop.width, crop.height));
             PyLook { each, view, crop, is_rendered }
         })
     }
 
-    /// tell(excess) --
+    /// tell(excess, *, alone=None) --
     ///
-    /// What was found of the two pictures, an Excess.
-    fn tell(&self, excess: PyRef<'_, PyExcess>) {
-        self.lock().tell(excess.excess, &excess.squares);
+    /// What was found of the two pictures that next() has asked for, an Excess; alone as of a Tuning.
+    ///
+    /// Raises ParameterError as that of a Tuning.
+    #[pyo3(signature = (excess, *, alone = None))]
+    fn tell(&self, excess: PyRef<'_, PyExcess>, alone: Option<f64>) -> PyResult<()> {
+        let told = with_alone(excess.excess, alone)?;
+        lock(&self.0).told()?.tell(told, &excess.squares);
+        Ok(())
     }
 
     /// The views, hardest first as far as it is known.
     #[getter]
     fn views(&self) -> Vec<usize> {
-        self.lock().views().to_vec()
+        lock(&self.0).search.views().to_vec()
     }
 
     /// How it ended, as of a Tuning; None before that.
     #[getter]
     fn ending(&self) -> Option<&'static str> {
-        let search = self.lock();
+        let Asked { search, .. } = &*lock(&self.0);
         if search.next().is_some() { None } else { ending(search.tuning().next()) }
     }
 
     /// The setting that is just enough; None unless one was found.
     #[getter]
     fn setting(&self) -> Option<f64> {
-        let search = self.lock();
+        let Asked { search, .. } = &*lock(&self.0);
         if search.next().is_some() { None } else { setting(search.tuning().next()) }
     }
 
     /// What was tried: (setting, ratio) of each step, as of a Tuning.
     #[getter]
     fn steps(&self) -> Vec<(f64, f64)> {
-        steps(self.lock().tuning())
+        steps(lock(&self.0).search.tuning())
     }
 }
 

@@ -1114,12 +1114,59 @@ class Settings(unittest.TestCase):
             self.assertAlmostEqual(found.map().max(), found.ratio, places=5)
             tuning.tell(found)
         self.assertEqual(tuning.ending, "found")
-        # A mean of two is as good as one picture of half the variance
+        # Each of the last two is enough. A mean of two is as good as one picture of half the variance
         other = nf.excess(
             self.noisy(3, tuning.setting * 2**0.5), self.noisy(4, tuning.setting * 2**0.5), params=params
         )
         self.assertTrue(0.75 < other.ratio < 1.15, other)
         self.assertEqual(tuning.steps[-1][1], found.ratio)
+        self.assertLessEqual(found.ratio * 2**0.5, 1)
+
+    def test_noise_in_levels_and_plateaus_is_claimed_as_it_was_seen(self):
+        """A renderer that looks at its threshold now and then; and one whose pixels have its fewest samples for long."""
+        for level in (1.1, 2**0.5, 2, 4):
+            for phase in np.linspace(0, 1, 15):
+                def noise(threshold):
+                    return level ** (np.floor(np.log(threshold) / np.log(level) - phase) + phase)
+
+                tuning = nf.Tuning(threshold=(0.2, 1e-4))
+                while (each := tuning.next()) is not None:
+                    tuning.tell(noise(each) / 2**0.5 / 0.03)
+                self.assertLessEqual(noise(tuning.setting), 0.03 * (1 + 1e-9), (level, phase, tuning.steps))
+        for above in (0.05, 0.03, 0.01):
+            tuning = nf.Tuning(threshold=(0.2, 0.001))
+            while (each := tuning.next()) is not None:
+                tuning.tell(nf.excess(*(self.noisy(seed, 2 * min(each, above)) for seed in (1, 2))))
+            self.assertEqual(tuning.ending, "found", tuning.steps)
+        # Where samples are known to follow, the mean of two speaks for one that is finer
+        tuning = nf.Tuning(threshold=(0.2, 0.001))
+        while (each := tuning.next()) is not None:
+            tuning.tell(each / 2**0.5 / 0.03, alone=each / 2**0.5 / 0.03)
+        self.assertTrue(0.029 < tuning.setting <= 0.03, tuning.steps)
+
+    def test_what_was_not_asked_for_is_not_told(self):
+        tuning = nf.Tuning(threshold=(0.2, 0.001))
+        with self.assertRaisesRegex(nf.ParameterError, "once"):
+            tuning.tell(1.0)
+        for wrong in (float("nan"), -1.0):
+            tuning.next()
+            with self.assertRaisesRegex(nf.ParameterError, "0 or more"):
+                tuning.tell(wrong)
+            with self.assertRaisesRegex(nf.ParameterError, "alone"):
+                tuning.tell(2.0, alone=wrong)
+        self.assertEqual(tuning.steps, [])
+        tuning.next()
+        tuning.tell(5.0)
+        with self.assertRaisesRegex(nf.ParameterError, "once"):
+            tuning.tell(5.0)
+        tuning.next()
+        tuning.tell(0.0)
+        # Not what has failed, nor in between without a look
+        each = tuning.next()
+        tuning.tell(3.0)
+        self.assertTrue(tuning.ending == "found" and tuning.setting < each < 0.2, tuning.steps)
+        with self.assertRaisesRegex(nf.ParameterError, "end"):
+            tuning.tell(1.0)
 
     def test_crops_stand_for_a_large_picture_and_the_whole_is_looked_at_in_the_end(self):
         params, size = nf.Params(tone_mapping="srgb"), (512, 256)
@@ -1171,7 +1218,7 @@ class Settings(unittest.TestCase):
             self.assertEqual(each, tuning.next())
             tuning.tell(100.0)
         self.assertEqual((tuning.ending, tuning.setting), ("at-finest", None))
-        for bad in ({}, {"samples": (16, 4)}, {"threshold": (0.1, 0.2)}, {"samples": (2, 4), "threshold": (1, 0.1)}):
+        for bad in ({}, {"samples": (16, 4)}, {"threshold": (0.1, 0.2)}, {"samples": (3, 3)}, {"threshold": (1e308, 1e-308)}, {"samples": (2, 4), "threshold": (1, 0.1)}):
             with self.assertRaises(nf.ParameterError):
                 nf.Tuning(**bad)
         picture = self.noisy(1, 0.1)

@@ -32,7 +32,12 @@ import bpy
 
 from . import hooks, panel, settings, tune
 
-CLASSES = (settings.Settings, tune.RENDER_OT_noisefloor_threshold, panel.RENDER_PT_noisefloor)
+CLASSES = (
+    settings.Settings,
+    tune.RENDER_OT_noisefloor_threshold,
+    tune.RENDER_OT_noisefloor_stop,
+    panel.RENDER_PT_noisefloor,
+)
 
 
 def register():

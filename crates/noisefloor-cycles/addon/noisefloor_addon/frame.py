@@ -195,7 +195,10 @@ class Frame:
         for x, y, width, height, ratio in self.excess.squares():
             cells = slice(y // CELL, -(-(y + height) // CELL)), slice(x // CELL, -(-(x + width) // CELL))
             self.ratio[cells] = numpy.maximum(self.ratio[cells], ratio)
-        self.tuning.tell(self.excess.ratio)
+        if self.excess.ratio <= 1:
+            return "found"
+        # All samples together are the picture
+        self.tuning.tell(self.excess.ratio, alone=self.excess.ratio)
         # What fails by so much needs the square of that as many samples, as far as it is noise
         spp = sum(half.samples for half in self.halves)[..., 0]
         times = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2, numpy.ones((CELL, CELL)))

@@ -10,6 +10,7 @@ command line.
 
 import os
 import threading
+import time
 import traceback
 
 import bpy
@@ -18,7 +19,7 @@ import numpy
 from bpy.app.handlers import persistent
 from gpu_extras.presets import draw_texture_2d
 
-from . import display, maps, passes
+from . import compositor, display, maps, passes
 from .frame import Frame
 
 original = {}
@@ -38,8 +39,11 @@ class State:
         self.shown = None
         # The thread that is about to ask which passes a render has, and of which scene, if that render is ours
         self.registering = None
-        # Of a search for the threshold: whether pictures are wanted, those of each layer, and how a render ended
-        self.wanted, self.rendered, self.ended = False, {}, None
+        # Of a search for the threshold: whether pictures are wanted, those of each layer, and how a render ended; and the search
+        # that is in progress in a window
+        self.wanted, self.rendered, self.ended, self.search = False, {}, None, None
+        # Seconds of the last frame of each scene, when what is rendered began, and frames since
+        self.took, self.begun, self.frames = {}, 0.0, 0
 
 
 state = State()
@@ -136,6 +140,10 @@ def _render(engine, depsgraph):
     depsgraph.update()
     depsgraph.scene_eval.camera.update_tag(refresh={"OBJECT"})
     frame = state.frame = Frame(engine, depsgraph, cycles, state.shown)
+    if frame.judge.note:
+        engine.report({"WARNING"}, f"noisefloor: {frame.judge.note}")
+    if compositor.denoises(depsgraph.scene) and not frame.denoises:
+        engine.report({"WARNING"}, f"noisefloor: {compositor.ADVICE}")
 
     def report(frame):
         text, share = _progress(frame)
@@ -218,6 +226,7 @@ def _headless(yes):
 @persistent
 def before_copy(scene, *_):
     state.rendering, state.written = True, False
+    state.begun, state.frames = time.monotonic(), 0
     if scene.noisefloor.use and scene.render.engine == "CYCLES":
         state.borrowed = scene.render.use_persistent_data
         scene.render.use_persistent_data = True
@@ -226,6 +235,7 @@ def before_copy(scene, *_):
 
 @persistent
 def after_copy(scene, *_):
+    state.frames += state.rendering
     ours = scene.noisefloor.use and scene.render.engine == "CYCLES" and not scene.render.use_multiview
     state.registering = (threading.get_ident(), scene.name) if ours and state.rendering else None
     if state.borrowed is not None:
@@ -240,6 +250,8 @@ def written(scene, *_):
 @persistent
 def completed(scene, *_):
     state.ended = "completed"
+    if not state.wanted:
+        state.took[scene.name] = (time.monotonic() - state.begun) / max(state.frames, 1)
     ended(scene)
 
 

@@ -19,6 +19,8 @@ class Judge:
     def __init__(self, scene, shown, film, denoised, catches):
         self.settings, self.film, self.catches = scene.noisefloor, film, catches
         self.library = denoise.library() if denoised else None
+        # What denoises, and why it is not what the scene says
+        self.device, self.note = denoise.device(scene, self.library) if self.library else (denoise.CPU, None)
         self.transparent = scene.render.film_transparent
         self.oracle = settings.oracle(self.settings)
         self.params = settings.params(scene, shown, film)
@@ -28,7 +30,7 @@ class Judge:
         """The denoised picture, with alpha, of passes by name."""
         made = passes["Combined"].copy()
         made[..., :3] = denoise.denoise(
-            self.library, passes["Combined"][..., :3], passes.get(ALBEDO), passes.get(NORMAL)
+            self.library, passes["Combined"][..., :3], passes.get(ALBEDO), passes.get(NORMAL), self.device
         )
         if self.catches and self.transparent:
             # Cycles does so with the light that a catcher lacks, of which alpha follows
@@ -38,7 +40,7 @@ class Judge:
 
     def denoise_alone(self, picture):
         """A picture of three channels, denoised by itself: its edges are not those of albedo and normals."""
-        return denoise.denoise(self.library, picture)
+        return denoise.denoise(self.library, picture, kind=self.device)
 
     def seen(self, picture):
         """A picture with alpha, as it is judged."""

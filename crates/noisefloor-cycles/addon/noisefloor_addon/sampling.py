@@ -62,16 +62,21 @@ def adapt(cycles, seed, threshold, samples):
     cycles.use_auto_tile = False
 
 
+def least(fewest, threshold, samples):
+    """The fewest samples that Cycles takes of a pixel with these settings: pixels stop after whole steps of 16, and not before
+    `fewest`, of which 0 are as many as Cycles takes on its own."""
+    fewest = fewest or math.ceil(16 / threshold**0.3)
+    return min((fewest // 16 + 1) * 16, samples)
+
+
 def counts(shares, fewest, threshold, samples):
     """Samples of each pixel of a picture that was rendered with these settings, from the pass that has them as shares of the
     most: an array of the same shape, float32.
 
-    Of how many, Cycles does not say. Pixels stop after whole steps of 16, not before the fewest samples; 0 are as many as
-    Cycles takes on its own."""
+    Of how many, Cycles does not say."""
     import numpy
 
-    fewest = fewest or math.ceil(16 / threshold**0.3)
-    first = min((fewest // 16 + 1) * 16, samples)
+    first = least(fewest, threshold, samples)
     some = numpy.unique(shares[shares > 0])
     for most in range(first, samples + 1):
         found = some.astype(numpy.float64) * most

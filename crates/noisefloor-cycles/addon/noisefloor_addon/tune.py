@@ -4,12 +4,15 @@ Cycles renders two pictures of different seeds with a coarse threshold, noiseflo
 people would see, and the next threshold follows, until it passes. Then the threshold is written into the scene, as if it
 had been typed: Blender renders as ever, on any device, on any farm."""
 
+import math
 import time
+import types
 
 import bpy
 import noisefloor
+import numpy
 
-from . import denoise, display, frame, hooks, judging, sampling
+from . import compositor, denoise, display, frame, hooks, judging, sampling
 
 ENDINGS = {
     "at-finest": "even the finest threshold tried is not enough",
@@ -44,14 +47,17 @@ class Search:
             side * shot.resolution_percentage // 100 for side in (shot.resolution_x, shot.resolution_y)
         )
         # A region of the user's own is a picture of its own, and small
+        # To a GPU, a part costs about what the whole does
+        whole = shot.use_border or denoise.gpu(scene)
         self.search = noisefloor.Search(
             threshold=(frame.COARSEST, frame.FINEST),
             views=len(self.frames),
-            size=None if shot.use_border else self.size,
+            size=None if whole else self.size,
         )
-        # What is rendered next; how hard the hardest frames are, with the whole pictures that crops may be cut from; and
-        # seconds of whole pictures
-        self.look, self.whole, self.pictures, self.begun, self.seconds = self.search.next(), {}, [], 0.0, []
+        # What is rendered next; and how hard the hardest frames are, with the whole pictures that crops may be cut from
+        self.look, self.whole, self.pictures, self.begun = self.search.next(), {}, [], 0.0
+        # Seconds so far, and of a sample, by the last picture, with its threshold and the samples of its pixels
+        self.spent, self.pace, self.counted, self.ending, self.stopped = 0.0, None, None, None, False
         # Cycles loads the scene once for all of them
         self.borrowed, self.persistent = [], shot.use_persistent_data
         shot.use_persistent_data = True
@@ -76,6 +82,7 @@ class Search:
             (scene.render, "use_compositing", False),
             (scene.render, "use_sequencer", False),
         ]
+        wanted += [(layer.cycles, "pass_debug_sample_count", True) for layer in layers]
         if self.denoised:
             wanted += [(layer.cycles, "denoising_store_passes", True) for layer in layers]
         owned = [(group, name) for group, name, _ in wanted] + [(shot, name) for name in BORDER]
@@ -108,31 +115,68 @@ class Search:
         self.give_back()
         if not rendered:
             raise ValueError("nothing was rendered; is there a view layer that is used for rendering?")
-        self.pictures.append(next(iter(rendered.values())))
-        if self.look.crop is None:
-            self.seconds = [*self.seconds[-1:], time.monotonic() - self.begun]
+        picture = next(iter(rendered.values()))
+        cycles = self.scene.cycles
+        limits = cycles.adaptive_min_samples, self.look.each, cycles.samples
+        picture[frame.COUNT] = sampling.counts(picture[frame.COUNT], *limits)
+        self.pictures.append(picture)
+        seconds = time.monotonic() - self.begun
+        self.spent += seconds
+        self.counted = self.look.each, picture[frame.COUNT]
+        self.pace = seconds / self.counted[1].sum()
         if len(self.pictures) < 2:
             return
         pictures, self.pictures = self.pictures, []
-        excess = self.judge.excess(pictures)
+        excess = self._tell(pictures)
         if self.look.crop is None:
             self.whole[self.look.view] = excess.ratio, pictures
             # So many crops lie in so many frames at the most
             if len(self.whole) > CROPS:
                 del self.whole[min(self.whole, key=lambda view: self.whole[view][0])]
-        self.search.tell(excess)
         while (look := self.search.next()) and look.is_rendered:
             x, y, width, height = look.crop
             here = slice(y, y + height), slice(x, x + width)
-            cut = [{name: each[here] for name, each in picture.items()} for picture in self.whole[look.view][1]]
-            self.search.tell(self.judge.excess(cut))
+            self._tell([{name: each[here] for name, each in picture.items()} for picture in self.whole[look.view][1]])
         if look is None or look.crop or look.each != self.look.each:
             self.whole = {}
+        if look and all((picture[frame.COUNT] >= cycles.samples).all() for picture in pictures):
+            look, self.ending = None, "unchanged"
         self.look = look
+
+    def _tell(self, pictures):
+        """Judges two pictures, and tells the search."""
+        excess = self.judge.excess(pictures)
+        self.search.tell(excess, alone=alone(excess, pictures, *self.fewest_and_most()))
+        return excess
+
+    def fewest_and_most(self):
+        """Samples of a pixel of the pictures that are rendered now."""
+        cycles = self.scene.cycles
+        return sampling.least(cycles.adaptive_min_samples, self.look.each, cycles.samples), cycles.samples
+
+    def samples(self, look):
+        """What a picture will take, over all its pixels: where they have more than the fewest samples, these follow the
+        threshold."""
+        cycles, (each, counts) = self.scene.cycles, self.counted
+        few, next_few = (sampling.least(cycles.adaptive_min_samples, t, cycles.samples) for t in (each, look.each))
+        following = numpy.minimum(counts * (each / look.each) ** 2, cycles.samples)
+        mean = float(numpy.where(counts > few, following, numpy.maximum(counts, next_few)).mean())
+        return mean * (look.crop[2] * look.crop[3] if look.crop else self.size[0] * self.size[1])
+
+    def left(self):
+        """Seconds until this look is done, at about; None if nothing is known."""
+        if self.counted is None or self.look is None:
+            return None
+        return self.pace * self.samples(self.look) * (2 - len(self.pictures))
+
+    def share(self):
+        """How much of that has passed."""
+        left = self.left()
+        return 0.0 if left is None else self.spent / max(self.spent + left, 1e-9)
 
     def status(self):
         """One line on how far it is."""
-        steps = self.search.steps
+        steps, left = self.search.steps, self.left()
         text = f"noisefloor: picture {len(self.pictures) + 1} of 2"
         if self.look and self.look.crop:
             text += " of a part"
@@ -140,12 +184,14 @@ class Search:
             text += f" of frame {self.frames[self.look.view]}"
         if steps:
             text += f"; {steps[-1][0]:.3g} leaves {steps[-1][1]:.2f} times what may be seen"
+        if left is not None:
+            text += f"; about {clock(left)} for this step"
         return text
 
     def finish(self):
         """Writes what was found into the scene; returns what it says."""
         if self.search.setting is None:
-            raise ValueError(ENDINGS[self.search.ending])
+            raise ValueError(ENDINGS[self.ending or self.search.ending])
         cycles = self.scene.cycles
         cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, self.search.setting
         people = (
@@ -157,9 +203,32 @@ class Search:
             people += f", frame {self.frames[self.search.views[0]]} is the hardest of {len(self.frames)}"
         if self.film:
             people += f", at {self.film:g} frames a second"
-        # One picture with the setting takes what both took with a coarser one
-        share = (self.search.steps[-1][0] / self.search.setting) ** 2
-        return f"{self.search.setting:.3g}: {people}; about {sum(self.seconds) * share:.0f} s a frame"
+        shot = types.SimpleNamespace(each=self.search.setting, crop=None)
+        people += f"; about {self.pace * self.samples(shot):.0f} s a frame"
+        if compositor.denoises(self.scene) and not self.denoised:
+            people += f"; {compositor.ADVICE}"
+        return f"{self.search.setting:.3g}: {people}"
+
+
+def alone(excess, pictures, fewest, most):
+    """What is left in one picture whose threshold is finer by the root of two, over what may be seen, by the samples that pixels
+    have: where they have more than the fewest and less than the most, noise follows the threshold."""
+    one, other = (picture["Combined"][..., :3] for picture in pictures)
+    bright = (one + other).mean(axis=-1) / 2
+    noise = ((one - other).mean(axis=-1) / (bright + bright.mean() + 1e-9)) ** 2
+    counts = [picture[frame.COUNT][..., 0] for picture in pictures]
+    follows = numpy.logical_or(*((count > fewest) & (count < most) for count in counts))
+
+    def of_square(x, y, width, height, ratio):
+        here = slice(y, y + height), slice(x, x + width)
+        share = noise[here][follows[here]].sum() / max(noise[here].sum(), 1e-30)
+        return ratio * math.sqrt(2 - share)
+
+    return max(of_square(*square) for square in excess.squares())
+
+
+def clock(seconds):
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
 
 
 class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
@@ -200,7 +269,7 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
         if bpy.app.background:
             return self.execute(context)
         try:
-            self.search = Search(context.scene)
+            self.search = hooks.state.search = Search(context.scene)
         except (ValueError, noisefloor.Error) as error:
             self.report({"ERROR"}, f"noisefloor: {error}")
             return {"CANCELLED"}
@@ -218,8 +287,11 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
     def modal(self, context, event):
         if event.type != "TIMER" or hooks.state.ended is None:
             return {"PASS_THROUGH"}
+        for area in context.screen.areas:
+            if area.type == "PROPERTIES":
+                area.tag_redraw()
         try:
-            if hooks.state.ended == "cancelled":
+            if hooks.state.ended == "cancelled" or self.search.stopped:
                 return self.end(context, {"CANCELLED"})
             self.search.take()
             if not self.search.done:
@@ -232,16 +304,54 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
             return self.end(context, {"CANCELLED"})
 
     def end(self, context, how):
+        hooks.state.search = None
         self.search.end()
         context.window_manager.event_timer_remove(self.timer)
         context.workspace.status_text_set(None)
         return how
 
 
+class RENDER_OT_noisefloor_stop(bpy.types.Operator):
+    """Stop the search after the picture that is being rendered; Esc stops that, too. All is as before"""
+
+    bl_idname = "render.noisefloor_stop"
+    bl_label = "Stop"
+
+    @classmethod
+    def poll(cls, context):
+        return hooks.state.search is not None and not hooks.state.search.stopped
+
+    def execute(self, context):
+        hooks.state.search.stopped = True
+        return {"FINISHED"}
+
+
+def estimate(scene):
+    """What a search will take, in words."""
+    last = hooks.state.took.get(scene.name)
+    about = f", about {clock(2 * last)} to {clock(3 * last)}" if last else ""
+    return f"Takes two to three frames{about}"
+
+
 def draw(panel, context):
-    """Beside Cycles' own field."""
+    """Beside Cycles' own field: for a still the loop first, for an animation the search."""
     scene = context.scene
-    if scene.cycles.use_adaptive_sampling:
-        panel.layout.operator(RENDER_OT_noisefloor_threshold.bl_idname, icon="VIEWZOOM")
+    column = panel.layout.column()
+    column.prop(scene.noisefloor, "use", text="Still: Render until nobody sees noise")
+    if not scene.cycles.use_adaptive_sampling:
+        return
+    search = hooks.state.search
+    row = column.row(align=True)
+    if search is None:
+        row.operator(RENDER_OT_noisefloor_threshold.bl_idname, text="Animation: Find Noise Threshold", icon="VIEWZOOM")
+        column.label(text=estimate(scene))
         if scene.timeline_markers:
-            panel.layout.prop(scene.noisefloor, "frames")
+            column.prop(scene.noisefloor, "frames")
+    else:
+        if hasattr(row, "progress"):  # Blender 4 and later
+            row.progress(factor=search.share(), text=search.status().removeprefix("noisefloor: "))
+        else:
+            row.label(text=search.status())
+        row.operator(RENDER_OT_noisefloor_stop.bl_idname, text="", icon="X")
+    if compositor.denoises(scene) and not scene.cycles.use_denoising:
+        column.label(text=compositor.ADVICE[0].upper() + compositor.ADVICE[1:], icon="INFO")

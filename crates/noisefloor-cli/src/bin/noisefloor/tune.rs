@@ -62,7 +62,7 @@ pub enum KnobChoice {
 /// One line of the search.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Row {
-    /// One picture with it is as good as the mean of the two.
+    /// One picture with it is as good as the mean of the two, if noise follows the setting.
     setting: f64,
     /// What each of the two was rendered with.
     each: f64,
@@ -78,9 +78,6 @@ struct Row {
     crops: usize,
     /// Follows from the pictures, so that equal ones are known ([`Excess::pictures`]).
     pictures: u64,
-    /// Of each picture ([`Excess::noise`]).
-    #[serde(default)]
-    noise: f64,
     /// For both pictures, and what judging them took.
     seconds: f64,
     judging_seconds: f64,
@@ -91,8 +88,7 @@ struct Report {
     knob: &'static str,
     /// Null if none was found.
     setting: Option<f64>,
-    /// As [`Ending::Found`] has them.
-    enough: Option<f64>,
+    /// As [`Ending::Found`] has it.
     too_coarse: Option<f64>,
     ending: &'static str,
     judged: String,
@@ -254,7 +250,9 @@ impl<'a> Tune<'a> {
         }
         self.whole.clear();
         let Some((look, judged)) = self.worst.take() else { return Ok(None) };
-        let told = self.search.tuning().steps().last().map_or(judged.excess, |step| step.excess);
+        // The last look at the whole, after crops, is no step of the search if it passes
+        let step = self.search.tuning().steps().last().filter(|step| step.each == look.each);
+        let told = step.map_or(judged.excess, |step| step.excess);
         self.rows.push(Row {
             setting: look.setting,
             each: look.each,
@@ -264,7 +262,6 @@ impl<'a> Tune<'a> {
             y: judged.excess.place.map(|(_, y)| y),
             crops: if look.crop.is_some() { job.regions } else { 0 },
             pictures: told.pictures,
-            noise: told.noise,
             seconds: std::mem::take(&mut self.rendering).as_secs_f64(),
             judging_seconds: std::mem::take(&mut self.judging).as_secs_f64(),
         });
@@ -277,9 +274,9 @@ impl<'a> Tune<'a> {
     }
 
     fn report(&self, ending: Option<Ending>) -> Report {
-        let (setting, enough, too_coarse) = match ending {
-            Some(Ending::Found { setting, enough, too_coarse }) => (Some(setting), Some(enough), too_coarse),
-            _ => (None, None, None),
+        let (setting, too_coarse) = match ending {
+            Some(Ending::Found { setting, too_coarse }) => (Some(setting), too_coarse),
+            _ => (None, None),
         };
         let ending = match ending {
             None => "searching",
@@ -291,7 +288,6 @@ impl<'a> Tune<'a> {
         Report {
             knob: name(self.search.tuning().knob()),
             setting,
-            enough,
             too_coarse,
             ending,
             judged: self.judges.said(),
@@ -312,8 +308,7 @@ impl<'a> Tune<'a> {
 impl Row {
     fn excess(&self) -> Excess {
         let ratio = self.ratio.unwrap_or(f64::INFINITY);
-        let (place, pictures, noise) = (self.x.zip(self.y), self.pictures, self.noise);
-        Excess { place, pictures, noise, ..Excess::new(ratio) }
+        Excess { place: self.x.zip(self.y), pictures: self.pictures, ..Excess::new(ratio) }
     }
 }
 
@@ -365,27 +360,20 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
     }
     let name = name(job.tuning.knob());
     match ending {
-        Ending::Found { setting, enough, too_coarse: None }
-            if report.steps.first().is_some_and(|step| step.setting == setting) =>
-        {
-            say!("{name} {setting}: the coarsest tried, and {enough} is enough; --from tries coarser ones")?
+        Ending::Found { setting, too_coarse: None } => {
+            say!("{name} {setting}: the coarsest tried is enough; --from tries coarser ones")?
         }
-        Ending::Found { setting, too_coarse: None, .. } => {
-            say!("{name} {setting}: enough in one picture; of coarser ones, it takes two together")?;
+        Ending::Found { setting, too_coarse: Some(coarse) } => {
+            say!("{name} {setting}; {coarse} is too coarse")?
         }
-        Ending::Found { setting, enough, too_coarse: Some(coarse) } if setting == enough => {
-            say!("{name} {setting}; {coarse} is too coarse")?;
-        }
-        Ending::Found { setting, enough, too_coarse: Some(coarse) } => say!(
-            "{name} {setting}: between {coarse}, which is too coarse, and {enough}, which is more than enough"
-        )?,
         Ending::AtFinest { ratio } => note!(
-            "error: even {name} {} leaves {ratio:.2} times too much; --to goes on from there",
-            report.steps.last().map_or(0.0, |step| step.setting)
+            "error: even {name} {} leaves {ratio:.2} times too much in the mean of two pictures; --to goes on from there",
+            report.steps.last().map_or(0.0, |step| step.each)
         ),
         Ending::Unchanged => note!(
-            "error: finer settings give the same pictures: the renderer does not look at the {name}, or has \
-             reached its most samples (--max-spp)"
+            "error: the finest settings, down to {name} {}, give the same pictures: the renderer does not look at the {name}, or \
+             has reached its most samples (--max-spp), or takes its fewest samples with all of them (--to tries finer ones)",
+            report.steps.last().map_or(0.0, |step| step.each)
         ),
         Ending::NotFalling { ratio } => note!(
             "error: more samples do not make it better ({ratio:.2} times too much): what is wrong is no noise; a \

@@ -25,8 +25,8 @@ use std::path::PathBuf;
 /// Renderers with a noise threshold (Cycles, LuxCore, and any program) know better than tiles where samples go; what
 /// nobody knows is the number. From a coarse setting on, two pictures of different seeds are rendered, and the
 /// noise that both leave is judged where it is worst; the next setting follows from how it falls, until nobody
-/// sees noise. That takes two to four steps, each a fraction of the next. The mean of the last two pictures is
-/// as good as one with the setting found; --keep writes it.
+/// would see noise in one of them. That takes two to four steps, each a fraction of the next. --keep writes the mean of the last
+/// two pictures.
 ///
 /// With --denoise, the denoised picture is judged: how many just-objectionable differences (JOD) its worst
 /// square of 64 pixels has lost. Nobody has been asked about denoised pictures: the limit is the vision model's.
