@@ -503,8 +503,11 @@ export class Session {
   #setCurve({ curve, exposure = 1 }) {
     if (curve === "linear") return;
     const known = typeof curve === "string" ? curves[curve] : curve;
-    if (typeof known !== "function") position(["linear", ...Object.keys(curves)], curve, "tone curve");
-    const table = toneTable(known);
+    const made = known instanceof Float32Array; // a table of toneTable(), from background.js
+    if (!made && typeof known !== "function") {
+      position(["linear", ...Object.keys(curves)], curve, "tone curve");
+    }
+    const table = made ? known : toneTable(known);
     withBytes(new Uint8Array(table.buffer), (at) =>
       this.#call("nf_session_set_tone_table", exposure, TOE, TOP, at, table.length, EDGE),
     );

@@ -190,7 +190,7 @@ pub unsafe extern "C" fn nf_background_requests(
         let lent = lent(background)?;
         let tiles = lent.session.grid.len();
         // SAFETY: promised by the caller.
-        let room = unsafe { border::array_mut(requests, capacity, tiles, "requests") }?;
+        let room = unsafe { border::room(requests, capacity, tiles, "requests") }?;
         let wanted: Vec<Request> = lent.background.requests();
         // SAFETY: promised by the caller.
         unsafe { border::write(count, wanted.len(), "count") }?;

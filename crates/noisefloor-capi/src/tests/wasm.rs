@@ -40,6 +40,7 @@ fn the_package_keeps_its_promises_in_node() {
     let Some(()) = package() else { return };
     node(&js(), "test/noisefloor.test.mjs", &[]);
     node(&js(), "test/tone.test.mjs", &[]);
+    node(&js(), "test/background.test.mjs", &[]);
 }
 
 /// What a session was told, and what it said: sizes and options, then pushes (1), running means (2) and
