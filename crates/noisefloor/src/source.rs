@@ -206,7 +206,7 @@ pub struct Reference {
     pub pixels: Vec<Rgb>,
 }
 
-/// What camera rays meet first, without any light: auxiliary pictures for denoisers.
+/// What camera rays meet first, also behind smooth glass and in mirrors, without any light: auxiliary pictures for denoisers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstHits {
     /// Width in pixels, the same as the source's.
@@ -295,7 +295,9 @@ pub trait ProgressiveSource {
         Ok(None)
     }
 
-    /// Renders albedo and normals of first hits from `spp` camera rays a pixel, if this source has them.
+    /// Renders albedo and normals of first hits from up to `spp` camera rays a pixel, if this source has them: fewer may do
+    /// where the rays of a pixel agree. Behind smooth glass and in smooth mirrors, denoisers are helped most by the first
+    /// surface that scatters, times what is lost on the way.
     ///
     /// Pictures of different `index` are independent of each other and of all samples: each half buffer is
     /// denoised with a picture of its own. A source whose pictures have no noise may return the same for every
