@@ -85,11 +85,10 @@ pub(crate) fn alpha_of(path: &Path, opened: Opened) -> Result<LinearImage, Pictu
     guarded(path, "EXR", || decode_unguarded(path, opened, choose_alpha))
 }
 
-fn decode_unguarded(
-    path: &Path,
-    opened: Opened,
-    choose: fn(&Path, &[Header], Option<&str>) -> Result<Choice, PictureError>,
-) -> Result<LinearImage, PictureError> {
+/// Says which channels of a file are read; the last word is the layer that the user has named.
+type Chooser = fn(&Path, &[Header], Option<&str>) -> Result<Choice, PictureError>;
+
+fn decode_unguarded(path: &Path, opened: Opened, choose: Chooser) -> Result<LinearImage, PictureError> {
     let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
 
     // Headers: which part, which channels, how large; nothing that the file is too short for

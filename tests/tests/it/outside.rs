@@ -458,8 +458,11 @@ fn hash(x: usize, y: usize) -> f32 {
     (mixed >> 16) as f32 / 65_536.0
 }
 
-const NOISELESS: [(&str, fn(usize, usize) -> f32); 7] = [
-    ("checker of black and white", |x, y| if (x + y) % 2 == 0 { 1.0 } else { 0.0 }),
+/// Radiance of a pixel.
+type Level = fn(usize, usize) -> f32;
+
+const NOISELESS: [(&str, Level); 7] = [
+    ("checker of black and white", |x, y| if (x + y).is_multiple_of(2) { 1.0 } else { 0.0 }),
     ("foliage", |x, y| 0.05 + 0.4 * hash(x, y)),
     ("of many decades", |x, y| (10.0 * hash(x, y)).exp()),
     ("lines", |x, _| if x % 4 < 2 { 1.0 } else { 0.01 }),

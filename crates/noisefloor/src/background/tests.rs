@@ -230,6 +230,7 @@ fn gate() -> (Arc<AtomicBool>, Session<Calls<impl FnMut() + Send>>) {
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "the renderer's own thread")]
 fn a_renderer_waits_for_room() {
     let (open, session) = gate();
     let background = Background::new(session, 2, WhenFull::Wait).unwrap();

@@ -248,7 +248,7 @@ fn batch(truth: &[f64], tile: Tile, spp: u64, half: u64) -> Vec<Rgb> {
 #[test]
 fn a_sample_of_a_large_picture_is_enough() {
     let size = (1230, 570);
-    let regular = |x: usize, y: usize| if (x / 16 + y / 16) % 2 == 0 { 1.0 } else { 0.05 };
+    let regular = |x: usize, y: usize| if (x / 16 + y / 16).is_multiple_of(2) { 1.0 } else { 0.05 };
     let stripes = |x: usize, _: usize| if x % 24 < 8 { 1.0 } else { 0.01 };
     let slow = |x: usize, y: usize| ((x as f64 / 200.0).sin() * 2.0 + (y as f64 / 90.0).cos()).exp();
     let small = |x: usize, y: usize| if (x / 40 % 7, y / 40 % 5) == (3, 2) { 50.0 } else { 0.2 };
