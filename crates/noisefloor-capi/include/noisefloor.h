@@ -648,7 +648,8 @@ NfStatus nf_tuning_next(const NfTuning *tuning, NfTuningStep *step);
 
 // Says what was found of the two pictures that nf_tuning_next asked for, once. NF_STATUS_ARGUMENT if it has not asked since, and
 // for ratios that are negative or not a number.
-NfStatus nf_tuning_tell(const NfTuning *tuning, NfExcess excess);
+NfStatus nf_tuning_tell(const NfTuning *tuning,
+                        NfExcess excess);
 
 // Frees a search. NULL is ignored, a second time is NF_STATUS_HANDLE.
 NfStatus nf_tuning_free(NfTuning *tuning);

@@ -202,7 +202,6 @@ fn a_setting_for_a_sequence_is_that_of_its_hardest_frame() {
     ];
     fail(&[&base[..], &["--frames", "1,2,3", "--seed", "9"]].concat(), &["cannot be resumed", "--force"]);
     fail(&[&base[..], &["--frames", "1,2"]].concat(), &["other frames", "--force"]);
-    fail(&[&base[..], &["--frames", "1,2,1"]].concat(), &["frame 1 twice"]);
     fail(&["tune", "cornell-box", "--frames", "1,2"], &["{frame}"]);
     std::fs::write(folder.path().join("shot3"), "0.6").unwrap();
     fail(&[&base[..], &["--frames", "1,2,3"]].concat(), &["shot3", "has changed"]);

@@ -53,6 +53,7 @@ fn params(spaced: bool) -> Params {
 fn session(spaced: bool) -> Session<Oracle> {
     let mut session = Session::new(80, 48, Oracle::bundled(), params(spaced)).unwrap();
     session.set_source(Wall { seed: 3 }.identity().unwrap());
+    session.set_linear();
     session
 }
 

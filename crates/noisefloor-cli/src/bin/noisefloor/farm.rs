@@ -266,7 +266,10 @@ impl Studio for Here {
         render.check_program()?;
         let Ready { params, oracle } = render.job.read()?;
         let criterion = render.job.criterion.of(oracle.as_ref()).context("a farm does not denoise")?;
-        Ok(Session::new(width, height, criterion, params)?)
+        let mut session = Session::new(width, height, criterion, params)?;
+        // As a driver does: sources deliver radiance
+        session.set_linear();
+        Ok(session)
     }
 
     fn occupied(&self, folder: &Path) -> Option<&'static str> {
