@@ -366,6 +366,12 @@ impl Oracle {
     ) -> Result<Option<Described>, CriterionError> {
         let Some(shown) = unmet.shown(view.film, view.display, tile) else { return Ok(None) };
         let Some(mut planes) = self.planes(view, tile)? else { return Ok(None) };
+        // Either sign of the difference of the halves is as good, and light has one: that which does not hang on which
+        // half is which
+        let sum: f64 = planes.residual.iter().map(|&r| f64::from(r)).sum();
+        if sum < 0.0 {
+            planes.residual.mapv_inplace(|r| -r);
+        }
         planes.residual += &shown;
         let described = self.describe(&planes, view.film.spp(tile.index) as f64).map(Some);
         planes.recycle();
