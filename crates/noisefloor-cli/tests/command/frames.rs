@@ -422,7 +422,8 @@ fn a_draft_may_stop_below_a_hundred_samples() {
     assert!(output.status.success());
     assert_eq!(stderr(&output).matches("tiles of 32 pixels are small").count(), 1);
     let [spp, reason] = ["spp", "reason"].map(|name| column(&out.join("stops.csv"), name));
-    let early = |(spp, reason): (&String, &String)| reason == "converged" && spp.parse::<u64>().unwrap() < 100;
+    let early =
+        |(spp, reason): (&String, &String)| reason == "converged" && spp.parse::<u64>().unwrap() < 100;
     assert!(spp.iter().zip(&reason).any(early), "{spp:?}");
 }
 

@@ -100,7 +100,8 @@ fn a_scene_with_a_reference_is_held_against_it() {
     let table = reference(EDGE).unwrap();
     for (level, alone) in table.zones[0].levels.iter().zip(&alone.zones[0].levels) {
         // But for the rounding of a mean of two pictures
-        let same = level.descriptor.iter().zip(&alone.descriptor).take(256).all(|(a, b)| (a - b).abs() < 1e-6);
+        let same =
+            level.descriptor.iter().zip(&alone.descriptor).take(256).all(|(a, b)| (a - b).abs() < 1e-6);
         assert!(same, "the picture is the same");
         for value in &level.descriptor[256..] {
             assert!((value - 0.735_357).abs() < 1e-5, "{value}");
