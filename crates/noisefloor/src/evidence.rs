@@ -303,14 +303,14 @@ fn of_mean([mean, a, b]: [f32; 3], [of_a, of_b]: [f32; 2]) -> [f32; 2] {
 
 /// How far the display holds the mean at the brighter of two halves: 0 if it lies between them as their weights say, 1 if
 /// it is as bright as that half. Squared, so that the bend of a tone curve within the noise counts for nothing. Where the
-/// brighter half has nearly all samples, the mean is as bright as that half in any case: below a quarter of the samples,
+/// brighter half has nearly all samples, the mean is as bright as that half in any case: below a fiftieth of the samples,
 /// the darker half tells the less, the fewer it has.
 pub fn held([mean, a, b]: [f32; 3], [of_a, of_b]: [f32; 2]) -> f32 {
     let linear = of_a * a + of_b * b;
     let of_darker = if a < b { of_a } else { of_b };
     let most = (a - b).abs() * of_darker;
     let drawn = if most > 0.0 { ((mean - linear) / most).clamp(0.0, 1.0) } else { 0.0 };
-    drawn * drawn * (4.0 * of_darker).min(1.0)
+    drawn * drawn * (50.0 * of_darker).min(1.0)
 }
 
 /// The image coordinate that shows at `place` of a plane that begins [`HALO`] before the image, mirrored at
