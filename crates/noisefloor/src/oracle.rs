@@ -267,7 +267,7 @@ impl Oracle {
         let described = self.describe(&planes, view.film.spp(tile.index) as f64);
         let spread = planes.noise_spread();
         planes.recycle();
-        let met_once = MetOnce::of(view.film, tile);
+        let met_once = MetOnce::of(view.film, view.display, tile);
         described.map(|tile| Some(LastDescribed { tile, spread, met_once, lacked: None }))
     }
 

@@ -37,6 +37,10 @@ const NOTHING: f32 = 0.5 / 255.0;
 /// Exposed radiance of an average grey.
 const GREY: f32 = 0.18;
 
+/// A sample of more times an average grey is an accident of arithmetic, and tells of no light. If it did, 10⁹ samples, a
+/// thousand of each pixel of 1280×800, would have to be taken before a second such find could go unseen.
+const ACCIDENT: f32 = 1e7;
+
 /// What only one half has met, in a part of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct MetOnce {
@@ -49,8 +53,9 @@ pub(crate) struct MetOnce {
 
 impl MetOnce {
     /// In a tile of a film that keeps two halves, of which both have samples there; else nothing.
-    pub(crate) fn of(film: &Film, tile: Tile) -> Self {
+    pub(crate) fn of(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
+        let accident = ACCIDENT * GREY / display.exposure();
         let mut met = Self { pixels: tile.pixels() as f64, ..Self::default() };
         if film.half_counts(tile.index).contains(&0) {
             return met;
@@ -71,7 +76,10 @@ impl MetOnce {
                 let excess = [a.here()[x + 1] - b.highest_around(x), b.here()[x + 1] - a.highest_around(x)];
                 if excess[0].max(excess[1]) > 0.0 {
                     let counts = film.pixel_counts(tile.index, y * grid.width() + tile.x + x);
-                    met.add(excess, counts);
+                    let by_sample = excess.into_iter().zip(counts).map(|(e, n)| e * n as f32);
+                    if by_sample.fold(0.0, f32::max) <= accident {
+                        met.add(excess, counts);
+                    }
                 }
             }
         }

@@ -106,8 +106,8 @@ fn agx_like() -> ToneCurve {
     ToneTable::new(edge, toe, top, values).unwrap().into_tone_curve()
 }
 
-/// Exchanging even halves changes nothing to the bit, with light that one of them alone has. (Of uneven ones, what is
-/// noticed of the samples may hang on which came first: docs/known-issues.md.)
+/// Exchanging even halves changes nothing to the bit, with light that one of them alone has. (Of uneven ones, the order
+/// matters in one way: a second batch that has more samples may be a total, and verdicts wait for two more.)
 #[test]
 fn exchanged_halves_are_judged_alike() {
     let criteria: [fn() -> Criterion; 2] =

@@ -388,7 +388,6 @@ fn mirrors_change_no_verdict() {
 
 /// Which half got which samples is chance.
 #[test]
-#[ignore = "not run since evidence is symmetric in the halves: docs/known-issues.md"]
 fn halves_may_be_exchanged() {
     for (name, make) in criteria() {
         let fed = |exchanged: bool| {

@@ -1,6 +1,6 @@
 use super::*;
 use crate::checkpoint::Checkpoint;
-use crate::{Oracle, Params, Rgb, Session};
+use crate::{Oracle, Params, Rgb, Session, ToneMapping};
 use noisefloor_testkit::Noise;
 
 /// Edge of a picture of 16 tiles, and of a tile.
@@ -35,7 +35,13 @@ fn noisy(seed: u64, samples: u64, spread: f64) -> Vec<Rgb> {
 }
 
 fn all(film: &Film) -> Vec<Option<MetOnce>> {
-    grid().tiles().map(|tile| Some(MetOnce::of(film, tile))).collect()
+    all_exposed(film, 1.0)
+}
+
+/// With an exposure.
+fn all_exposed(film: &Film, exposure: f32) -> Vec<Option<MetOnce>> {
+    let display = ToneMapping::Srgb { exposure }.settle(&[]);
+    grid().tiles().map(|tile| Some(MetOnce::of(film, &display, tile))).collect()
 }
 
 /// The most that a tile lacks, as a share of the picture's light.
@@ -63,6 +69,19 @@ fn one_find_may_lie_anywhere_around_it_and_in_the_picture() {
     for (index, pixels) in [(5, 9 * 1024), (4, 6 * 1024), (15, 16 * 1024)] {
         assert!((light(index) / spread(pixels) - 1.0).abs() < 1e-5, "{index}: {}", light(index));
     }
+}
+
+/// What no picture can be made of tells of nothing, in however many places it stands, and hides nothing beside it.
+#[test]
+fn accidents_of_arithmetic_tell_of_no_light() {
+    let flat = vec![[BASE; 3]; EDGE * EDGE];
+    let (mut found, mut both) = (flat.clone(), flat.clone());
+    found[5 * EDGE + 6] = [1e5; 3];
+    both[5 * EDGE + 6] = [1e5; 3];
+    (0..5).for_each(|i| both[(20 + 7 * i) * EDGE + 11] = [1e12; 3]);
+    let [one, other] = [&found, &both].map(|half| all(&film([half, &flat], [5, 5])));
+    assert_eq!(one, other);
+    assert!(one[0].unwrap().light > 4e4);
 }
 
 /// As Good and Turing have it: what was met once makes up as much as what was not met. Samples find light at
@@ -114,7 +133,9 @@ fn ordinary_noise_hides_nothing() {
 fn halves_are_equals_and_radiance_has_no_unit() {
     let mut halves = [3, 4].map(|seed| noisy(seed, 20, 2.0));
     halves[0][77] = [90.0, 30.0, 10.0];
-    let of = |a: &[Rgb], b: &[Rgb], samples| all(&film([a, b], samples));
+    let exposed =
+        |a: &[Rgb], b: &[Rgb], samples, unit: f64| all_exposed(&film([a, b], samples), (1.0 / unit) as f32);
+    let of = |a: &[Rgb], b: &[Rgb], samples| exposed(a, b, samples, 1.0);
     let found = of(&halves[0], &halves[1], [20, 30]);
     assert_eq!(found, of(&halves[1], &halves[0], [30, 20]));
     for power in [-100, -3, 40] {
@@ -123,7 +144,7 @@ fn halves_are_equals_and_radiance_has_no_unit() {
             .each_ref()
             .map(|h| h.iter().map(|p| p.map(|c| (f64::from(c) * unit) as f32)).collect::<Vec<Rgb>>());
         for (found, scaled) in
-            found.iter().flatten().zip(of(&scaled[0], &scaled[1], [20, 30]).iter().flatten())
+            found.iter().flatten().zip(exposed(&scaled[0], &scaled[1], [20, 30], unit).iter().flatten())
         {
             assert_eq!((found.light * unit, found.by_sample * unit * unit), (scaled.light, scaled.by_sample));
         }
