@@ -313,6 +313,11 @@ pub enum Warning {
          count the samples that the picture then has"
     )]
     Behind(f64),
+    /// Batches of more and more samples look like running means.
+    #[error(
+        "each batch is said to have more samples than the one before, and seems to contain these (correlation {0:.2}): if          they are means of all samples so far, push them by push_running; no tile is done while they look so"
+    )]
+    Totals(f64),
 }
 
 /// A grey as one number, and a colour as three.
@@ -533,6 +538,7 @@ impl Watch {
         }
         let found = self.sums.iter().flat_map(|sums| sums.warnings(self.shared));
         let found = found.chain(self.sums[0].doubt().map(Warning::Noise));
+        let found = found.chain(self.sums[0].may_be_totals().map(Warning::Totals));
         let samples = film.total_samples();
         let mixed_up = if samples >= self.borders_at { borders::mix_up(film) } else { None };
         if samples >= self.borders_at {
@@ -585,7 +591,7 @@ impl Watch {
     pub(crate) fn doubts(&self) -> bool {
         let sums = &self.sums[0];
         sums.doubt().is_some()
-            || sums.may_be_totals()
+            || sums.may_be_totals().is_some()
             || self.tiles.iter().any(|tile| tile.grows && tile.batches < 4)
             || self.alike().is_some()
             || (self.running && self.warnings.iter().any(|warning| matches!(warning, Warning::Rounded(_))))

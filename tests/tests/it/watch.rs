@@ -45,7 +45,6 @@ fn stacks_on_disk_are_silent() {
 
 /// The built-in Cornell box has its lamp in view. Whatever is said is said before a tile stops.
 #[test]
-#[ignore = "what is said, and when, has changed with the tests for totals: docs/known-issues.md"]
 fn mistakes_in_a_picture_with_a_lamp_are_noticed_before_a_tile_stops() {
     for (edge, seed) in [(64, 7), (64, 8), (64, 9), (128, 7)] {
         let options = RenderOptions { sampling: Sampling::Independent, seed, ..RenderOptions::default() };
@@ -58,8 +57,9 @@ fn mistakes_in_a_picture_with_a_lamp_are_noticed_before_a_tile_stops() {
             assert!(silent(&right), "{edge}, {passes:?}: {right:?}");
 
             let running = fed(Mistake::RunningMeans);
-            let sure = matches!(running.fault, Some((..=64, Fault::Running { .. })));
-            assert!(sure, "{edge}, {passes:?}: {running:?}");
+            // While they are doubted, no verdict is due, and so no look at them, until half as many more have come
+            let sure = matches!(running.fault, Some((..=80, Fault::Running { .. })));
+            assert!(sure, "{edge}, {seed}, {passes:?}: {running:?}");
             let again = fed(Mistake::OneSeed);
             let said = match passes {
                 None => matches!(again.fault, Some((..=32, Fault::Repeated { .. }))),
@@ -69,9 +69,7 @@ fn mistakes_in_a_picture_with_a_lamp_are_noticed_before_a_tile_stops() {
             assert!(said, "{edge}, {passes:?}: {again:?}");
             let totals = fed(Mistake::RunningTotals);
             let sure = matches!(totals.fault, Some((..=80, Fault::Running { .. })));
-            // Few batches of few pixels, which grow, do not tell by then; no tile stops meanwhile
-            let few = edge == 64 && passes.is_none() && totals.fault.is_none();
-            assert!((sure || few) && totals.first_stop.is_none(), "{edge}, {passes:?}: {totals:?}");
+            assert!(sure && totals.first_stop.is_none(), "{edge}, {seed}, {passes:?}: {totals:?}");
             assert_eq!((running.first_stop, again.first_stop), (None, None));
 
             for (mistake, correlation) in [(Mistake::GaussianFilter, 0.37), (Mistake::Blur, 0.67)] {

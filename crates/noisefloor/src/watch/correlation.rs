@@ -12,6 +12,9 @@ const MUCH: f64 = 0.15;
 const DOUBTFUL: f64 = 4.5;
 /// Excess of noise of later running means from which their counts may be behind: it is 1.5 by one pass of equal ones.
 const AHEAD: f64 = 1.15;
+/// Share by which signs agree more often than not from which batches seem to contain the ones before. Totals of equal
+/// passes have 0.27, less where some pixels have no noise.
+const AGREED: f64 = 0.1;
 /// Standard errors that tell which of two faults it is, if it is one.
 const LIKELY: f64 = 2.0;
 
@@ -68,10 +71,18 @@ pub(super) struct Concordance {
 impl Concordance {
     /// Of one tile, as one term if its pixels share samples.
     pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
+        Self::sized(pairs.map(|(x, y)| (x * y, (x * y).abs().sqrt())), as_one)
+    }
+
+    /// The same by signs alone, for differences that are distributed symmetrically: all that are not 0 count alike.
+    pub(super) fn of_signs(pairs: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
+        let sign = |(x, y): (f64, f64)| if x * y == 0.0 { 0.0 } else { x.signum() * y.signum() };
+        Self::sized(pairs.map(sign).map(|sign| (sign, sign.abs())), as_one)
+    }
+
+    fn sized(products: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
         let mut all = Self::default();
-        for (x, y) in pairs {
-            let product = x * y;
-            let size = product.abs().sqrt();
+        for (product, size) in products {
             all.sum += size.copysign(product);
             all.squares += size * size;
             all.sizes += size;
@@ -250,20 +261,24 @@ impl Sums {
         self.early.value() > MUCH && self.z(&self.early) > by
     }
 
-    /// Whether batches that are said to have more and more samples seem to contain the ones before.
-    pub(super) fn may_be_totals(&self) -> bool {
-        self.z(&self.totals) > DOUBTFUL && self.totals.value() > STRONG / 2.0
+    /// The correlation of batches that are said to have more and more samples, if they seem to contain the ones before.
+    pub(super) fn may_be_totals(&self) -> Option<f64> {
+        let correlation = self.totals.value();
+        (self.z(&self.totals) > DOUBTFUL && correlation > AGREED).then_some(correlation)
     }
 
     pub(super) fn fault(&self) -> Result<(), Fault> {
-        if self.z(&self.totals) > CERTAIN && self.totals.value() > STRONG {
-            return Err(Fault::Running { correlation: self.totals.value() });
+        if let Some(correlation) = self.may_be_totals().filter(|_| self.z(&self.totals) > CERTAIN) {
+            return Err(Fault::Running { correlation });
         }
         let (z, correlation) = self.of_batches();
         if z < CERTAIN || correlation < STRONG {
             return Ok(());
         }
-        Err(if self.steps.ratio() > FACTOR || self.is_falling(LIKELY) {
+        // Where the light of a scene changes, steps differ, but a is as noisy as b
+        let smaller_steps =
+            self.steps.ratio() > FACTOR && (self.early.sizes == 0.0 || self.early.value() > 0.0);
+        Err(if smaller_steps || self.is_falling(LIKELY) {
             Fault::Running { correlation }
         } else {
             Fault::Shared { correlation }

@@ -266,15 +266,20 @@ fn four([a, b, c, d]: [&WatchedBatch; 4], shared: bool, sums: &mut Sums) {
         sums.batches = Concordance::of(pairs(ac, bd), shared);
     }
     if a.spp < b.spp && b.spp < c.spp && c.spp < d.spp {
-        // Noise of unlike numbers of samples is skewed unlike. That of two pixels that are alike is not
+        // Noise of unlike numbers of samples is skewed unlike. That of two pixels that are alike is not, so that signs are
+        // enough, which no firefly outweighs
         let beside = |one: &WatchedBatch, other: &WatchedBatch, i: usize| {
-            let at = |seen: &WatchedBatch| f64::from(seen.light[i][1]) - f64::from(seen.light[i][2]);
-            finite((at(one) - at(other)) * weights[i])
+            let [_, here, right] =
+                std::array::from_fn(|place| f64::from(one.light[i][place] - other.light[i][place]));
+            let noise = here - right;
+            let size: f32 =
+                [one, other].iter().map(|seen| seen.light[i][1].abs() + seen.light[i][2].abs()).sum();
+            if noise.abs() > f64::from(ROUNDING * size) { finite(noise * weights[i]) } else { 0.0 }
         };
         let (ac, bd): (Vec<f64>, Vec<f64>) =
             (0..weights.len()).map(|i| (beside(a, c, i), beside(b, d, i))).unzip();
         add_rows(&ac, &mut sums.rows);
-        sums.totals = Concordance::of(pairs(ac, bd), shared);
+        sums.totals = Concordance::of_signs(pairs(ac, bd), shared);
     }
     if a.spp == b.spp && alike(b, c) {
         sums.nested = Correlation::of(ab.iter().copied().zip(combined([1.0, 1.0, -2.0, 0.0])));

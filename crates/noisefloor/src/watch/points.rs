@@ -20,18 +20,20 @@ impl Points {
     /// Places (x, y) within this tile, row-major; each has a neighbour to the left and to the right. None of a
     /// tile that is narrower than three pixels.
     pub(super) fn of(self, tile: Tile) -> impl Iterator<Item = (usize, usize)> + Clone {
-        Self::every(self.step, tile)
+        Self::every(self.step, self.step, tile)
     }
 
-    /// As [`Points::of`], four times as many: for the first batches, by which a tile could stop soon.
+    /// As [`Points::of`], four times as many, and eight in small pictures, of which every second pixel of each row is
+    /// watched: for the first batches, by which a tile could stop soon.
     pub(super) fn at_first(self, tile: Tile) -> impl Iterator<Item = (usize, usize)> + Clone {
-        Self::every(self.step / 2, tile)
+        let step = self.step / 2;
+        Self::every(if step > 2 { step } else { 1 }, step, tile)
     }
 
-    fn every(step: usize, tile: Tile) -> impl Iterator<Item = (usize, usize)> + Clone {
-        let middle = step / 2 - 1;
-        let columns = (middle.max(1)..tile.width.saturating_sub(1)).step_by(step);
-        let rows = (middle.min(tile.height - 1)..tile.height).step_by(step);
+    fn every(down: usize, across: usize, tile: Tile) -> impl Iterator<Item = (usize, usize)> + Clone {
+        let middle = |step: usize| (step / 2).saturating_sub(1);
+        let columns = (middle(across).max(1)..tile.width.saturating_sub(1)).step_by(across);
+        let rows = (middle(down).min(tile.height - 1)..tile.height).step_by(down);
         rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
     }
 }
