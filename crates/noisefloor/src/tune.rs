@@ -25,13 +25,13 @@ mod search;
 
 pub use search::{CROP, Look, Search, crops_for};
 
-use crate::criterion::CriterionError;
-use crate::film::blend_row;
+use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
+use crate::film::{Film, blend_row};
 use crate::oracle::Oracle;
 use crate::params::Params;
 use crate::rgb::Rgb;
 use crate::stills::{SnapshotPair, Still, StillError, StillWarning};
-use crate::tile::{Tile, TileError, TileGrid};
+use crate::tile::{Tile, TileError, TileGrid, TilePixels};
 use std::f64::consts::SQRT_2;
 use thiserror::Error;
 
@@ -264,8 +264,8 @@ pub enum PairError {
 }
 
 impl PicturePair {
-    /// Linear radiance, row-major, width × height values each. `spp`, samples per pixel of each, is used for
-    /// audiences that are not factors only; 128, say, where it is not known.
+    /// Linear radiance, row-major, width × height values each. `spp` is samples per pixel of each: below 50, noise of few
+    /// pixels is not trusted, and neither is a small picture. Where it is not known, 128, say.
     ///
     /// # Errors
     /// [`StillError`] if a pixel is not finite, the sizes do not fit, or the pictures are the same.
@@ -308,20 +308,41 @@ impl PicturePair {
     }
 
     /// How far the noise of the mean is from what the share of people asked for does not see, and the map of
-    /// it, row-major, 1 where it is just that. What is only likely to be wrong with the pictures is for
-    /// [`PicturePair::notice`] to say.
+    /// it, row-major, 1 where it is just that: as a session has it whose film has the two pictures as its halves, with
+    /// the light that they are likely not to have met, and with more samples wanted where noise is not trusted yet. What
+    /// is only likely to be wrong with the pictures is for [`PicturePair::notice`] to say.
     ///
     /// # Errors
     /// [`PairError`], also if the pictures are no two of one view, or no light.
     pub fn noise(&self, oracle: &Oracle, params: &Params) -> Result<(Excess, Vec<f32>), PairError> {
         self.notice(params)?;
         let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
-        let described = self.compare(params).describe(oracle, grid)?;
-        let map = oracle.map_visible_noise(grid, &described, params.audience).ok_or(PairError::NoMap)?;
+        let tiles: Vec<Tile> = grid.tiles().collect();
+        let (film, pair) = (self.film(grid), self.compare(params));
+        let (display, viewing) = (pair.display(), params.viewing);
+        let view = View { film: &film, display, viewing, audience: params.audience, reference: None };
+        let verdicts = oracle.clone().judge(&view, &tiles)?;
+        let map = oracle.visible_noise(&view).ok_or(PairError::NoMap)?;
+
         let worst = (0..map.len()).max_by(|&a, &b| map[a].total_cmp(&map[b]));
         let ratio = worst.map_or(0.0, |worst| f64::from(map[worst]));
+        // Noise falls as the root of the samples
+        let wanted = |verdict: &Verdict| verdict.expected_spp.map_or(f64::INFINITY, |spp| spp as f64);
+        let doubted = verdicts.iter().filter(|verdict| verdict.doubted).map(wanted).fold(0.0, f64::max);
+        let ratio = ratio.max((doubted / film.spp(0) as f64).sqrt());
         let place = worst.map(|worst| (worst % self.size().0, worst / self.size().0));
         Ok((self.tell_apart(Excess { place, ..Excess::new(ratio) }), map))
+    }
+
+    /// The two pictures as halves.
+    fn film(&self, grid: TileGrid) -> Film {
+        let mut film = Film::new(grid);
+        let tiles: Vec<Tile> = grid.tiles().collect();
+        for half in &self.halves {
+            let spp = half.spp.round().max(1.0) as u64;
+            film.add_tiles(spp, &tiles, |tile| TilePixels::in_image(tile, &half.pixels, grid.width()));
+        }
+        film
     }
 
     /// An excess of these pictures, with what tells them from those of other settings: [`Excess::pictures`].

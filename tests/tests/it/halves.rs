@@ -214,3 +214,31 @@ fn two_pictures_are_two_halves() {
         }
     }
 }
+
+/// Two pictures wait as a session does whose film has them as its halves: for light that they are likely to lack, and where
+/// noise cannot be trusted yet.
+#[test]
+fn two_pictures_are_guarded_as_a_session_is() {
+    // One dot in a large clean picture holds its tile; what else it says, the session says of the other tiles
+    let mut noise = Noise::new(9);
+    let [clean, other] = [0, 0].map(|_| rendered(&mut noise, 0.001, 0, 1.0));
+    let mut dotted = clean.clone();
+    dotted[40 * SIZE.0 + 20] = [900.0; 3];
+    let params = Params::default().with_tile(32).with_tone_mapping(ToneMapping::Srgb { exposure: 1.0 });
+    for (spp, one, enough) in
+        [(10, &clean, false), (24, &clean, false), (200, &clean, true), (200, &dotted, false)]
+    {
+        let pair = PicturePair::new(SIZE, [one.clone(), other.clone()], spp as f64).unwrap();
+        let (excess, map) = pair.noise(&Oracle::bundled(), &params).unwrap();
+        let mut session =
+            Session::new(SIZE.0, SIZE.1, Oracle::bundled(), params.clone().with_min_spp(2)).unwrap();
+        session.push_image(spp, one).unwrap();
+        session.push_image(spp, &other).unwrap();
+        let stops = session.judge().unwrap().len();
+        let done = stops == session.film().grid().len();
+        assert_eq!((excess.ratio <= 1.0, done), (enough, enough), "{spp}: {excess:?}, {stops} stops");
+        assert_eq!(session.visible_noise().unwrap(), map);
+        let trusted = 100.0 / (2 * spp) as f64;
+        assert!(excess.ratio >= trusted.sqrt() || trusted < 1.0, "{spp}: {excess:?}");
+    }
+}
