@@ -88,7 +88,7 @@
 // Settings down to the finest give the same pictures: the renderer ignores the setting, or reaches another limit first.
 #define NF_TUNING_UNCHANGED 3
 
-// More samples do not make it better: what is wrong is no noise, or the pictures are not independent.
+// More samples do not make it better: what is wrong is no noise, few samples find the light, or the pictures are not independent.
 #define NF_TUNING_NOT_FALLING 4
 
 // How a call ended. nf_last_error has the words.

@@ -19,7 +19,7 @@ pub const NF_TUNING_FOUND: u32 = 1;
 pub const NF_TUNING_AT_FINEST: u32 = 2;
 /// Settings down to the finest give the same pictures: the renderer ignores the setting, or reaches another limit first.
 pub const NF_TUNING_UNCHANGED: u32 = 3;
-/// More samples do not make it better: what is wrong is no noise, or the pictures are not independent.
+/// More samples do not make it better: what is wrong is no noise, few samples find the light, or the pictures are not independent.
 pub const NF_TUNING_NOT_FALLING: u32 = 4;
 
 /// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.

@@ -414,7 +414,7 @@ pub enum Ending {
     /// All settings down to the finest gave the same pictures: the renderer ignores the setting, or has reached another limit, such
     /// as its most samples, or the fewest that it takes.
     Unchanged,
-    /// More effort does not make less noise: what is wrong is no noise, or the pictures are not independent.
+    /// More effort does not make less noise: what is wrong is no noise, few samples find the light, or the pictures are not independent.
     NotFalling {
         /// Over what may be seen.
         ratio: f64,

@@ -376,8 +376,8 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
             report.steps.last().map_or(0.0, |step| step.each)
         ),
         Ending::NotFalling { ratio } => note!(
-            "error: more samples do not make it better ({ratio:.2} times too much): what is wrong is no noise; a \
-             denoiser may have reached its limit, or the pictures share their random numbers"
+            "error: more samples do not make it better ({ratio:.2} times too much): few samples may \
+             find much of the light, a denoiser may have reached its limit, or the pictures share their random numbers"
         ),
     }
     if matches!(ending, Ending::Found { .. }) {
