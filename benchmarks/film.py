@@ -5,6 +5,7 @@ command, which is what is measured).
     pip install cvvdp==0.5.7 OpenEXR pillow
     benchmarks/film.py render FOLDER NOISEFLOOR     renders that are there are kept; on two cores an hour
     benchmarks/film.py table FOLDER NOISEFLOOR
+    benchmarks/film.py stop FOLDER NOISEFLOOR       what films have lost where they stop, beside stills; on two cores an hour
     benchmarks/film.py denoised FOLDER NOISEFLOOR   needs mitsuba-oidn==0.1.2 as well
     benchmarks/film.py camera FOLDER NOISEFLOOR     cameras that move, in scenes of moving.py; on two cores an hour
     benchmarks/film.py forecast FOLDER NOISEFLOOR   what sequences take and what was forecast; needs only numpy
@@ -21,6 +22,8 @@ FRAMES, EDGE, RATES = 30, 192, (24, 25, 30, 60)
 # Frames that are judged one by one
 JUDGED = 6
 DISPLAY = "standard_fhd"
+# From the mean observer to 95 % of people, in samples (`noisefloor inspect`); only a scale here
+TO_95 = 2.6
 
 task, folder, program = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3]
 renders = [(scene, spp, seed) for scene in SCENES for spp in SCENES[scene] for seed in range(1, FRAMES + 1)]
@@ -116,11 +119,15 @@ metric = pycvvdp.cvvdp(display_name=DISPLAY, quiet=True, device=torch.device("cp
 weights = np.array([0.2126, 0.7152, 0.0722])
 
 
-def read(scene, spp, seed):
-    channels = OpenEXR.File(str(folder / f"{scene}-{spp}-{seed}" / "image.exr")).channels()
+def linear(out):
+    channels = OpenEXR.File(str(out / "image.exr")).channels()
     if "RGB" in channels:
         return np.asarray(channels["RGB"].pixels, dtype=np.float64)[..., :3]
     return np.stack([np.asarray(channels[c].pixels, dtype=np.float64) for c in "RGB"], axis=-1)
+
+
+def read(scene, spp, seed):
+    return linear(folder / f"{scene}-{spp}-{seed}")
 
 
 def shown(linear, exposure):
@@ -216,6 +223,51 @@ if task == "camera":
             package, found, standing, found_standing = cells
             print(f"| {scene}, {move} | {spp} | {package:.2f} | {found:.2f} | {standing:.2f}, {found_standing:.2f} |",
                   flush=True)
+    sys.exit()
+
+if task == "stop":
+    edge, tile, spp, count = 128, 64, 144, 30
+    corners = [(y, x) for y in range(0, edge, tile) for x in range(0, edge, tile)]
+    crops = lambda pictures: [np.ascontiguousarray(np.asarray(pictures)[..., y : y + tile, x : x + tile, :]) for y, x in corners]
+    print("| scene | samples of the still | lost | " + " | ".join(f"{rate} fps: samples, lost" for rate in RATES) + " |")
+    print("|---|---|---|" + "---|" * len(RATES))
+    for scene in ("cornell-box", "arcade", "bulb", "softbox", "glass-spheres"):
+        outs = [folder / f"stop-{scene}-{seed}" for seed in range(1, count + 1)]
+        for seed, out in enumerate(outs, 1):
+            if not (out / "image.exr").exists():
+                subprocess.run([program, "render", scene, "--size", f"{edge}x{edge}", "--criterion", f"spp:{spp}", "--max-spp",
+                                str(spp), "--autosave", "0", "--seed", str(seed), "--quiet", "--force", "--out", str(out)],
+                               check=True)
+        renders = [linear(out) for out in outs]
+        truth = np.mean(renders, axis=0)
+        noise = (np.stack(renders) - truth) * math.sqrt(count / (count - 1))
+        exposure = 0.18 / math.exp(np.mean(np.log(truth @ weights + 1e-6)))
+
+        def needs(viewing):
+            """Samples at which tiles stop: by pairs of renders as two halves, without the waits of small pictures."""
+            found = []
+            for a, b in zip(outs[:8:2], outs[1:8:2]):
+                judge = [program, "judge", str(a / "image.exr"), "--against", str(b / "image.exr"), "--independent", "--spp",
+                         str(spp), "--spp", str(spp), "--tile", str(tile), "--viewing", viewing, "--eyes", "none", "--json"]
+                tiles = json.loads(subprocess.run(judge, check=True, capture_output=True, text=True).stdout)["tiles"]
+                found.append([math.sqrt(t["threshold"]["low"] * t["threshold"]["high"]) for t in tiles])
+            return TO_95 * np.exp(np.mean(np.log(found), axis=0))
+
+        def at(samples):
+            """Frames with as much noise as tiles have after these samples: noise of renders, scaled."""
+            of_pixel = np.kron(np.asarray(samples).reshape(edge // tile, -1), np.ones((tile, tile)))[..., None]
+            return [shown(truth + one * np.sqrt(spp / of_pixel), exposure) for one in noise]
+
+        reference = crops(shown(truth, exposure))
+        stop = needs(DISPLAY)
+        lost = np.mean([[still(*pair) for pair in zip(crops(frame), reference)] for frame in at(stop)[:8]], axis=0)
+        cells = []
+        for rate in RATES:
+            sooner = needs(f"{DISPLAY},fps={rate}")
+            frames = crops(at(sooner))
+            of_film = [film(of, [same] * count, float(rate)) for of, same in zip(frames, reference)]
+            cells.append(f"×{np.mean(sooner / stop):.2f}, ×{np.mean(of_film) / np.mean(lost):.2f}")
+        print(f"| {scene} | {stop.min():.0f} to {stop.max():.0f} | {lost.mean():.2f} | {' | '.join(cells)} |", flush=True)
     sys.exit()
 
 if task == "denoised":

@@ -36,7 +36,7 @@ ANCHORS = [
     "| median of the *same* scene's other zones | {median.error} | {median.bias} | {median.early} | {median.images} |",
     "The worst scene errs by {worst.error}; with other scenes like these, the error would lie between {nested.low} and "
     "{nested.high}",
-    "asks; {nested.below} of the zones stop below what the mean person asked for.",
+    "Of the zones, {nested.below} stop below what the mean person asked for.",
 ]
 KEY = re.compile(r"\{([\w.]+)\}")
 NUMBER = re.compile(r"\d+(?:,\d{3})*(?:\.\d+)?")
