@@ -47,6 +47,9 @@ pub struct SourceJob {
     pub frame: Option<i32>,
     pub size: Option<(usize, usize)>,
     pub max_depth: Option<u32>,
+    /// What another renderer computes on, as it was typed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
     /// How the built-in renderer loads scene files.
     pub scene_files: LoadOptions,
 }

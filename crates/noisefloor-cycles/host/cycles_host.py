@@ -14,6 +14,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import host
 
 
+# What Cycles can compute on beside the processor, best first
+KINDS = ["OPTIX", "CUDA", "HIP", "ONEAPI", "METAL"]
 # Settings of the scene that samples of a session are not taken by, and those of `adaptive` are
 OWN = [
     "pixel_filter_type",
@@ -58,16 +60,42 @@ class Cycles:
             self.scene.frame_set(init["frame"])
         if self.scene.camera is None:
             raise ValueError(f"{path} has no camera")
-        warnings = self._configure(init)
         self.memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+        # What the file says is the default: a GPU that is not there renders on the processor, as in Blender
+        wanted = init.get("device") or ("auto" if self.scene.cycles.device == "GPU" else "cpu")
+        warnings = self._configure(init)
+        gpu, note = host.pick(wanted, *(self.gpus() if wanted != "cpu" else ([], "")), self._use)
+        if gpu is None:
+            self.scene.cycles.device = "CPU"
+        warnings += [note] if note else []
         self.info = {
-            "name": f"Cycles {bpy.app.version_string}",
+            "name": f"Cycles {bpy.app.version_string}{f' ({gpu[0]}, {gpu[1]})' if gpu else ''}",
             "width": self.scene.render.resolution_x,
             "height": self.scene.render.resolution_y,
             "unit": "samples-per-pixel",
             "repeats": "samples",
             "warnings": warnings,
         }
+
+    @staticmethod
+    def gpus():
+        import bpy
+
+        own, found = bpy.context.preferences.addons["cycles"].preferences, []
+        there = {kind for kind, *_ in own.get_device_types(bpy.context)}
+        for kind in KINDS:
+            if kind in there:
+                found += [(kind, each.name, each.id) for each in own.get_devices_for_type(kind) if each.type == kind]
+        return found, "Cycles finds no device of OptiX, CUDA, HIP, oneAPI or Metal"
+
+    def _use(self, gpu):
+        """Has this GPU alone render; raises if it cannot. The first picture may wait for kernels that are compiled."""
+        own = self.bpy.context.preferences.addons["cycles"].preferences
+        own.compute_device_type = gpu[0]
+        for each in own.get_devices_for_type(gpu[0]):
+            each.use = each.id == gpu[2]
+        self.scene.cycles.device = "GPU"
+        self._mean((0, 0, 1, 1), 0, 0, 1)
 
     def _configure(self, init):
         """Makes the scene render plain samples; returns warnings."""
@@ -76,7 +104,6 @@ class Cycles:
         if render.engine != "CYCLES":
             warnings.append(f"the scene was made for {render.engine}; Cycles renders it")
             render.engine = "CYCLES"
-        cycles.device = "CPU"
         render.use_persistent_data = True
         if init.get("threads"):
             render.threads_mode, render.threads = "FIXED", init["threads"]

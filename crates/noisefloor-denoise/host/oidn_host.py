@@ -2,8 +2,8 @@
 
 Pictures: "radiance", linear and not negative, scaled so that the network sees it as it is; optionally "albedo" in [0, 1], and
 with it "normal" in [-1, 1], or "clean albedo" and "clean normal", which have no noise. "albedo" or "normal" alone is denoised
-itself. Runs on the CPU, with a number of threads that depends on the size of the picture alone: the last bits of its results
-depend on it. Processors with other instructions may round otherwise, too.
+itself. Runs on the CPU unless init["device"] says otherwise, with a number of threads that depends on the size of the picture
+alone: the last bits of its results depend on it. Processors with other instructions may round otherwise, and GPUs do.
 """
 
 import os
@@ -27,30 +27,77 @@ class Oidn:
         self.oidn, self.np = mitsuba_oidn, numpy
         self.filters = {}
         self.pool = ThreadPoolExecutor(2)
-        self.info = {"name": f"Open Image Denoise {mitsuba_oidn.Device(mitsuba_oidn.DeviceType.CPU).version}"}
+        self.gpu, note = host.pick(init.get("device") or "cpu", *self.gpus(), self.device)
+        name = f"Open Image Denoise {mitsuba_oidn.Device(mitsuba_oidn.DeviceType.CPU).version}"
+        self.info = {"name": f"{name} ({self.gpu[1]}, {self.gpu[0]})" if self.gpu else name}
+        self.info["warnings"] = [note] if note else []
+
+    @staticmethod
+    def gpus():
+        import mitsuba_oidn
+
+        found = [each for each in mitsuba_oidn.physical_devices() if each.type != mitsuba_oidn.DeviceType.CPU]
+        return [(each.type.name, each.name, each.id) for each in found], "Open Image Denoise finds none that it knows"
+
+    def device(self, gpu):
+        """A device that is ready."""
+        device = self.oidn.Device.from_physical(gpu[2])
+        device.commit()
+        return device
 
     def filter(self, width, height, frames):
+        if self.gpu:
+            return [self.staged(width, height, frame) for frame in frames]
         small = width * height <= SMALL
         # One filter for each frame at work: it is busy meanwhile
         slots = range(len(frames)) if small else [0] * len(frames)
         run = self.pool.map if small else map
         return list(run(lambda slot, frame: self.one(slot, width, height, frame), slots, frames))
 
-    def one(self, slot, width, height, frame):
-        def array(name):
-            return self.np.frombuffer(frame[name], "<f4").reshape(height, width, 3).astype(self.np.float32)
-
-        made = self.np.empty((height, width, 3), self.np.float32)
-        filter = self.filter_for(slot, (width, height), tuple(frame))
-        for name in frame:
+    def pictures(self, width, height, frame):
+        """The pictures of a frame, by the names that the filter has for them."""
+        for name, data in frame.items():
+            picture = self.np.frombuffer(data, "<f4").reshape(height, width, 3).astype(self.np.float32)
             if name == "radiance":
                 # It is never negative; rounding may make it so
-                filter.set_image("color", self.np.maximum(array(name), 0.0))
+                yield "color", self.np.maximum(picture, 0.0)
             else:
-                filter.set_image(name.removeprefix(CLEAN), array(name))
+                yield name.removeprefix(CLEAN), picture
+
+    def one(self, slot, width, height, frame):
+        made = self.np.empty((height, width, 3), self.np.float32)
+        filter = self.filter_for(slot, (width, height), tuple(frame))
+        for name, picture in self.pictures(width, height, frame):
+            filter.set_image(name, picture)
         filter.set_image("output", made)
         filter.execute()
         return made
+
+    def staged(self, width, height, frame):
+        """One picture, by way of a device's own memory."""
+        what = (width, height), tuple(frame)
+        last, device, filter, buffers = self.filters.get("staged", (None, None, None, {}))
+        made, pictures = self.np.empty((height, width, 3), self.np.float32), dict(self.pictures(width, height, frame))
+        if last != what:
+            device, buffers = device or self.device(self.gpu), {}
+            filter = self.settle(device.new_filter("RT"), tuple(frame))
+            for name in [*pictures, "output"]:
+                buffers[name] = device.new_buffer(made.nbytes)
+                filter.set_image(name, buffers[name], format=self.oidn.Format.Float3, width=width, height=height)
+            self.filters["staged"] = what, device, filter, buffers
+        for name, picture in pictures.items():
+            buffers[name].write(picture)
+        filter.execute()
+        buffers["output"].read(made)
+        return made
+
+    def settle(self, filter, names):
+        """Of pictures of these names, in the best quality."""
+        filter.quality = self.oidn.Quality.High
+        if "radiance" in names:
+            filter.hdr, filter.input_scale = True, 1.0
+        filter.clean_aux = any(name.startswith(CLEAN) for name in names)
+        return filter
 
     def filter_for(self, slot, size, names):
         """The filter of a slot, as it was for the last picture if that was alike: it reads its weights only once."""
@@ -61,11 +108,7 @@ class Oidn:
             # Threads that are bound to cores would share them with those of the other frame
             device.set_bool("setAffinity", False)
             device.commit()
-            filter = device.new_filter("RT")
-            filter.quality = self.oidn.Quality.High
-            if "radiance" in names:
-                filter.hdr, filter.input_scale = True, 1.0
-            filter.clean_aux = any(name.startswith(CLEAN) for name in names)
+            filter = self.settle(device.new_filter("RT"), names)
             self.filters[slot] = (size, names), filter
         return filter
 

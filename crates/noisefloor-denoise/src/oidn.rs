@@ -31,7 +31,7 @@ const GREY: f32 = 0.18;
 const METERED: usize = 16;
 const BLACK: f32 = 1e-8;
 
-/// [Open Image Denoise](https://www.openimagedenoise.org) on the CPU: its filter `RT` for linear pictures, in
+/// [Open Image Denoise](https://www.openimagedenoise.org), on the CPU unless [`FilterPlan::device`] says otherwise: its filter `RT` for linear pictures, in
 /// its highest quality. Pictures of up to 512×512 pixels take one thread each, larger ones four, whatever
 /// [`FilterPlan::threads`] says: the last bits of its results depend on their number.
 #[derive(Debug)]
@@ -51,6 +51,11 @@ impl Oidn {
             last_words: String::new(),
         })?;
         Ok(Self(PictureFilter::open(&OIDN, &python, plan)?))
+    }
+
+    /// What the user should know, such as why no GPU denoises.
+    pub fn warnings(&self) -> &[String] {
+        self.0.warnings()
     }
 
     /// Gives a call up as soon as the flag is set; see [`PictureFilter::give_up_when`].

@@ -21,6 +21,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import host
 
 ENGINES = {"path": "PATHCPU", "bidir": "BIDIRCPU"}
+# Where a GPU traces paths; from both ends, none can
+ON_GPU = "PATHOCL"
 SAMPLERS = {"random": "RANDOM", "sobol": "SOBOL", "metropolis": "METROPOLIS"}
 # What a configuration may say that would stop a session, alter its samples, or cost time for nothing
 REMOVED = ["batch.", "periodicsave.", "resumerendering.", "film.outputs.", "film.imagepipeline", "film.subregion"]
@@ -87,12 +89,18 @@ class LuxCore:
         self.seed, self.drawn = init["seed"], 0
         self.metropolis, self.sobol = sampler == "metropolis", sampler == "sobol"
 
+        gpu, note = self._device(init.get("device") or "cpu", engine)
         warnings = self._configure(init["scene"], init, engine, sampler)
+        warnings += [note] if note else []
+        if gpu:
+            on = {"renderengine.type": ON_GPU, "opencl.native.threads.count": 0, "opencl.devices.select": gpu[2]}
+            for key, value in on.items():
+                self.config.Set(pyluxcore.Property(key, [value]))
         self.scene = None if self.metropolis else self._scene()
         # Samples a pixel that tiles have been given beyond those said, and the pairs of chains of tiles
         self.surplus, self.chains = {}, {}
         self.info = {
-            "name": f"LuxCore {pyluxcore.Version()} ({engine}, {sampler})",
+            "name": f"LuxCore {pyluxcore.Version()} ({engine}, {sampler}{f', {gpu[1]}' if gpu else ''})",
             "width": self.width,
             "height": self.height,
             "unit": "mutations-per-pixel" if self.metropolis else "samples-per-pixel",
@@ -100,6 +108,29 @@ class LuxCore:
             "late": OVERRUN,
             "warnings": warnings,
         }
+
+    @staticmethod
+    def gpus():
+        import numpy  # noqa: F401
+        import pyluxcore
+
+        pyluxcore.Init(lambda message: None)
+        there = pyluxcore.GetOpenCLDeviceList()
+        found = []
+        for number, (name, kind, *_) in enumerate(there):
+            # A device is chosen by its place in a row of all
+            place = "".join(str(int(other == number)) for other in range(len(there)))
+            if kind.endswith("_GPU"):
+                found.append((kind.removesuffix("_GPU"), name, place))
+        # CUDA before OpenCL, which is the same card, slower
+        return sorted(found, key=lambda gpu: gpu[0] != "CUDA"), "LuxCore finds no device of CUDA or OpenCL"
+
+    def _device(self, wanted, engine):
+        if wanted == "cpu":
+            return None, None
+        if engine != "path":
+            return host.pick(wanted, [], "LuxCore's tracer from both ends has no engine for GPUs")
+        return host.pick(wanted, *self.gpus())
 
     def sample(self, tiles):
         if self.metropolis:

@@ -9,8 +9,10 @@ import host
 # Numbers of samples that one lane of a wavefront may take one after the other: fewer results to add up, and still lanes for many
 # threads. The one that comes out even is chosen, since lanes run as long as the longest beside them.
 RUNS = range(8, 17)
-# Most lanes of one wavefront: 12 bytes of results each.
-LANES = 1 << 22
+# Most lanes of one wavefront, 12 bytes of results each: what fills the threads of a processor, and those of a large GPU.
+LANES, LANES_ON_GPU = 1 << 22, 1 << 25
+# Where a GPU renders.
+CUDA = "cuda_ad_rgb"
 # Edge of the blocks of the scalar variant, which number its random streams. Fixed, so that they do not depend on threads.
 BLOCK = 16
 # Integrators that sample single rays: along paths, only at first hits, or by way of other integrators.
@@ -29,10 +31,20 @@ class Mitsuba:
     """Loads the scene, and hands tiles to the variant that fits."""
 
     def __init__(self, init):
+        warnings, wanted, gpu = [], init.get("device") or "cpu", None
+        if wanted != "cpu":
+            gpu, note = host.pick(wanted, *host.gpus_of(__file__))
+            warnings += [note] if note else []
+        if gpu:
+            # The only one that Dr.Jit will see, which takes the first
+            visible = os.environ.get("CUDA_VISIBLE_DEVICES")
+            os.environ["CUDA_VISIBLE_DEVICES"] = visible.split(",")[gpu[2]] if visible else str(gpu[2])
         import mitsuba as mi
 
-        warnings = []
-        variant = choose_variant(mi, init["options"]["variant"], warnings)
+        if gpu:
+            gpu, note = host.pick("auto" if wanted == "auto" else "gpu", [gpu], "", lambda _: try_variant(mi, CUDA))
+            warnings += [note] if note else []
+        variant = CUDA if gpu else choose_variant(mi, init["options"]["variant"], warnings)
         collector = collect_warnings(mi, warnings)
         if init["threads"] is not None:
             import drjit
@@ -45,7 +57,7 @@ class Mitsuba:
         self.mi, self.np, self.aov = mi, self.renderer.np, None
         film = self.renderer.film
         self.info = {
-            "name": f"Mitsuba {mi.__version__} ({variant})",
+            "name": f"Mitsuba {mi.__version__} ({variant}{f', {gpu[1]}' if gpu else ''})",
             "width": film["width"],
             "height": film["height"],
             "unit": "samples-per-pixel",
@@ -78,16 +90,29 @@ class Mitsuba:
         albedo, normal = mean[:, :, :3], mean[:, :, 3:]
         return [np.ascontiguousarray(part, np.float32) for part in (np.clip(albedo, 0, 1), normal)]
 
+    @staticmethod
+    def gpus():
+        return host.cuda_gpus()
+
+
+def try_variant(mi, variant):
+    """Sets a variant; raises if it does not work here."""
+    mi.set_variant(variant)
+    if not variant.startswith("scalar"):
+        # Compiler and driver are looked for when they are first needed.
+        import drjit
+
+        drjit.eval(mi.Float(1) + drjit.arange(mi.Float, 2))
+    if variant == CUDA:
+        # A driver that computes may lack what traces rays
+        ball = mi.load_dict({"type": "scene", "ball": {"type": "sphere"}})
+        drjit.eval(ball.ray_test(mi.Ray3f(mi.Point3f(0, 0, drjit.arange(mi.Float, 2)), mi.Vector3f(0, 0, 1))))
+
 
 def choose_variant(mi, wanted, warnings):
     """Sets the variant, or the scalar one where that does not work here."""
     try:
-        mi.set_variant(wanted)
-        if not wanted.startswith("scalar"):
-            # The compiler is looked for when it is first needed.
-            import drjit
-
-            drjit.eval(mi.Float(1) + drjit.arange(mi.Float, 2))
+        try_variant(mi, wanted)
         return wanted
     except Exception as error:
         fallback = "scalar_rgb"
@@ -265,70 +290,86 @@ class Wavefront:
         self.sampler = Points()
 
     def sample(self, tiles):
-        # Tiles that want equally many samples share wavefronts.
-        groups = {}
-        for place, tile in enumerate(tiles):
-            groups.setdefault(tile["samples"], []).append(place)
-        batches = [None] * len(tiles)
-        for samples, places in groups.items():
-            means = self.means([tiles[place] for place in places], samples)
-            for place, mean in zip(places, means):
-                batches[place] = (samples, mean)
-        return batches
+        # Lanes for each pixel of a tile, and samples of a lane. They depend on nothing but the number of samples, so that sums are
+        # the same in any company
+        runs = [min(RUNS, key=lambda run: -tile["samples"] % run) for tile in tiles]
+        lanes = [-(-tile["samples"] // run) for tile, run in zip(tiles, runs)]
+        most = LANES_ON_GPU if self.mi.variant() == CUDA else LANES
+        means = [self.np.empty((tile["width"] * tile["height"], 3), self.np.float32) for tile in tiles]
+        # Pieces of tiles that fit a wavefront, as many as fit it together
+        together, taken = [], 0
+        for number, mean in enumerate(means):
+            rows = max(most // lanes[number], 1)
+            for start in range(0, len(mean), rows):
+                count = min(rows, len(mean) - start)
+                if taken + count * lanes[number] > most and together:
+                    self.wavefront(tiles, runs, lanes, together, means)
+                    together, taken = [], 0
+                together.append((number, start, count))
+                taken += count * lanes[number]
+        self.wavefront(tiles, runs, lanes, together, means)
+        return [(tile["samples"], mean) for tile, mean in zip(tiles, means)]
 
-    def means(self, tiles, samples):
-        np = self.np
-        x, y, point, sequence = (np.concatenate(column) for column in zip(*(self.pixels(tile) for tile in tiles)))
-        # Parts of samples and of pixels that fit a wavefront. Parts of samples depend on nothing but their number, so that
-        # sums are the same in any company.
-        part = min(samples, 1 << 12)
-        rows = max(LANES * RUNS[0] // part, 1)
-        sums = np.zeros((len(x), 3))
-        for start in range(0, len(x), rows):
-            some = slice(start, start + rows)
-            for done in range(0, samples, part):
-                number = min(part, samples - done)
-                sums[some] += self.wavefront(x[some], y[some], sequence[some], point[some] + np.uint64(done), number)
-        means = (sums / samples).astype(np.float32)
-        ends = np.cumsum([tile["width"] * tile["height"] for tile in tiles])
-        return np.split(means, ends[:-1])
-
-    def pixels(self, tile):
-        """Column and row of each pixel of a tile, row by row, index of its first point, and number of the sequence."""
-        np = self.np
-        y, x = np.mgrid[tile["y"] : tile["y"] + tile["height"], tile["x"] : tile["x"] + tile["width"]]
-        point, sequence = (np.full(x.size, tile[name], np.uint64) for name in ("point", "sequence"))
-        return x.ravel().astype(np.uint32), y.ravel().astype(np.uint32), point, sequence
-
-    def wavefront(self, x, y, sequence, point, samples):
-        """Sums of this many samples of these pixels."""
+    def wavefront(self, tiles, runs, lanes, pieces, means):
+        """Renders pieces, each a tile's number, its first pixel and how many there are, and puts them into the means of tiles."""
         mi, dr, np = self.mi, self.dr, self.np
-        # Opaque: numbers that were part of the kernel would have it compiled anew for every other.
-        longest = min(RUNS, key=lambda run: -samples % run)
-        lanes = -(-samples // longest)
-        each, total, run = (dr.opaque(mi.UInt32, number) for number in (lanes, samples, longest))
-        lane = dr.arange(mi.UInt32, len(x) * lanes)
-        row = lane // each
-        begin = (lane - row * each) * run
-        count = dr.minimum(total - begin, run)
+        numbers, starts, counts = (np.array(column) for column in zip(*pieces))
+        lanes_of = np.array([lanes[number] for number in numbers])
 
-        column_x, column_y = dr.gather(mi.UInt32, mi.UInt32(x), row), dr.gather(mi.UInt32, mi.UInt32(y), row)
-        pixel = mix(y.astype(np.uint64) << np.uint64(32) | x.astype(np.uint64), np.uint64)
-        pixel = mix(mix(pixel ^ self.seed, np.uint64) + sequence * np.uint64(GOLDEN), np.uint64)
-        key = dr.gather(mi.UInt64, mi.UInt64(pixel), row)
-        index = dr.gather(mi.UInt64, mi.UInt64(point), row) + mi.UInt64(begin)
+        def begins(sizes):
+            return np.cumsum(sizes) - sizes
+
+        def column(values, kind=mi.UInt32):
+            return kind(np.array(values, np.uint64 if kind is mi.UInt64 else np.uint32))
+
+        table = {name: column([tiles[number][name] for number in numbers]) for name in ("x", "y", "width", "samples")}
+        for name in ("point", "sequence"):
+            table[name] = column([tiles[number][name] for number in numbers], mi.UInt64)
+        table |= {"run": column([runs[number] for number in numbers]), "lanes": column(lanes_of), "start": column(starts)}
+        table |= {"first_lane": column(begins(counts * lanes_of)), "first_pixel": column(begins(counts))}
+
+        def of(name, piece):
+            return dr.gather(type(table[name]), table[name], piece)
+
+        # Only the piece is known of a lane here; whatever follows from it is worked out where the samples are taken. The
+        # processor's last vector may reach past the last lane, where a gather gives 0, and dividing by that is a fault
+        piece = column(np.repeat(np.arange(len(pieces)), counts * lanes_of))
+        lane = dr.arange(mi.UInt32, dr.width(piece)) - of("first_lane", piece)
+        each, width, run = dr.maximum(of("lanes", piece), 1), dr.maximum(of("width", piece), 1), of("run", piece)
+        place = lane // each
+        begin = (lane - place * each) * run
+        number = dr.minimum(of("samples", piece) - begin, run)
+        place += of("start", piece)
+        row = place // width
+        x, y = of("x", piece) + place - row * width, of("y", piece) + row
+        pixel = mix(mi.UInt64(y) << 32 | mi.UInt64(x), mi.UInt64)
+        key = mix(pixel ^ dr.opaque(mi.UInt64, self.seed), mi.UInt64) + of("sequence", piece) * mi.UInt64(GOLDEN)
+        key, index = mix(key, mi.UInt64), of("point", piece) + mi.UInt64(begin)
 
         def one_more(done, sum):
             self.seed_points(key, index + mi.UInt64(done))
-            return done + 1, sum + self.radiance(column_x, column_y)
+            return done + 1, sum + self.radiance(x, y)
 
         start = (mi.UInt32(0), mi.Color3f(0))
-        _, sum = dr.while_loop(start, lambda done, sum: done < count, one_more)
+        _, sum = dr.while_loop(start, lambda done, sum: done < number, one_more)
         # What was drawn in the loop has no meaning outside of it.
         self.seed_points(mi.UInt64(0), mi.UInt64(0))
         dr.eval(sum)
-        runs = [channel.numpy().reshape(len(x), lanes) for channel in sum]
-        return np.stack([run.sum(axis=1, dtype=np.float64) for run in runs], axis=-1)
+
+        # Lanes of a pixel one after the other, whatever runs them
+        piece = column(np.repeat(np.arange(len(pieces)), counts))
+        each, samples = of("lanes", piece), mi.Float64(of("samples", piece))
+        first = of("first_lane", piece) + (dr.arange(mi.UInt32, dr.width(piece)) - of("first_pixel", piece)) * each
+
+        def add_lane(place, *totals):
+            added = (total + mi.Float64(dr.gather(mi.Float, one, first + place)) for total, one in zip(totals, sum))
+            return place + 1, *added
+
+        start = (mi.UInt32(0), mi.Float64(0), mi.Float64(0), mi.Float64(0))
+        _, *totals = dr.while_loop(start, lambda place, *totals: place < each, add_lane)
+        mean = dr.ravel(mi.Color3f([mi.Float(total / samples) for total in totals])).numpy().reshape(-1, 3)
+        for number, first, count, begin in zip(numbers, starts, counts, begins(counts)):
+            means[number][first : first + count] = mean[begin : begin + count]
 
     def first_hits(self):
         """An integrator whose last six channels are the albedo and the shading normal of the first surface that scatters, also

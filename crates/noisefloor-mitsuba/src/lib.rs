@@ -19,6 +19,8 @@
 //!   libLLVM 17 or newer, from `DRJIT_LIBLLVM_PATH` or else the newest in the usual places. Mitsuba refuses
 //!   version 14, and versions 15 and 16 crash it; without a newer one the scalar variant is used, with a
 //!   warning.
+//! - `cuda_ad_rgb` takes the place of both where [`Job::device`] is a GPU: samples as with [`Variant::Llvm`], on NVIDIA's
+//!   cards, by OptiX. Two renders are the same to the bit there (one H200, 2026-11-27).
 //! - [`Variant::Scalar`]: tile by tile, as crop windows, with independent samples. The source repeats calls. Mitsuba numbers streams
 //!   with 32 bits here, one per pixel and call: after 2³² of them (16,384 batches of a picture of 512×512
 //!   pixels) streams recur, in other places.

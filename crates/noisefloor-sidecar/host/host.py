@@ -19,6 +19,9 @@ A filter, such as a denoiser, has a name in `info`, and one method instead:
 
         def filter(self, width, height, frames): ...   # an array each; a frame: bytes of float32 RGB by name
 
+With `gpus()`, a static method that returns what `pick` takes, a class says which GPUs it could use; `HOST_SCRIPT devices` prints
+them. init["device"] is what the user has asked for: "auto", "cpu", "gpu", a number, or a part of a name; None if nothing.
+
 `TileError` blames a failure on a tile; `rectangles` joins tiles for renderers to which every piece costs a start.
 Import the renderer in `__init__`, not at the top: what it prints while it loads must not get into the stream of frames.
 A frame is two little-endian u32 (length of header, length of payload), a header (a JSON object) and a payload (raw
@@ -39,6 +42,8 @@ MAX_HEADER = 1 << 20
 PR_SET_PDEATHSIG = 1
 # A long scene name or stack of causes must not push a reply over the limit.
 MAX_ERROR = 4000
+# Begins the line that lists GPUs: libraries print lines of their own.
+LISTED = "noisefloor GPUs: "
 
 
 class TileError(Exception):
@@ -49,8 +54,77 @@ class TileError(Exception):
         self.tile = tile
 
 
+def pick(wanted, gpus, nowhere, trial=lambda gpu: None):
+    """The GPU that `wanted` asks for, None for the processor, and a line for the user, None if there is nothing to say.
+
+    wanted: as in init["device"], not None. gpus: those that the renderer could use, best first, each a kind (such as "CUDA"), a
+    name, and whatever the renderer knows it by. nowhere: why there are none. trial: raises if one does not work. `auto` goes on to
+    the next GPU then, and to the processor; whatever else is asked for is an error if it does not work."""
+    if wanted == "cpu":
+        return None, None
+    some = gpus
+    if wanted.isdigit():
+        some = gpus[int(wanted) :][:1]
+    elif wanted not in ("auto", "gpu"):
+        some = [gpu for gpu in gpus if wanted.casefold() in f"{gpu[0]} {gpu[1]}".casefold()]
+    reasons = []
+    for gpu in some:
+        try:
+            trial(gpu)
+            return gpu, None
+        except Exception as error:
+            reasons.append(f"{gpu[1]} ({gpu[0]}): {(str(error).strip() or type(error).__name__).splitlines()[-1]}")
+    there = ", ".join(f"{number} is {gpu[1]} ({gpu[0]})" for number, gpu in enumerate(gpus))
+    why = "; ".join(reasons) or (nowhere if not gpus else f"of the GPUs, {there}")
+    if wanted == "auto":
+        return None, f"the processor does it, since no GPU works here: {why}"
+    raise ValueError(f"device {wanted} cannot be used: {why}; `auto` takes the processor where no GPU works")
+
+
+def cuda_gpus():
+    """The GPUs of NVIDIA's driver, as `pick` takes them, and why there are none. Loads nothing but the driver."""
+    import ctypes
+
+    try:
+        driver = ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
+    except OSError:
+        return [], "there is no NVIDIA driver"
+    error = driver.cuInit(0)
+    count, gpus = ctypes.c_int(), []
+    if error or driver.cuDeviceGetCount(ctypes.byref(count)):
+        return [], f"NVIDIA's driver finds no device (error {error})"
+    for number in range(count.value):
+        name = ctypes.create_string_buffer(256)
+        driver.cuDeviceGetName(name, len(name), number)
+        gpus.append(("CUDA", name.value.decode(errors="replace"), number))
+    return gpus, "NVIDIA's driver finds no device"
+
+
+def gpus_of(script):
+    """What `HOST_SCRIPT devices` says, as `pick` takes it; in a process of its own, since a driver that has been looked at does not
+    forget the devices it has shown."""
+    import subprocess
+
+    said = subprocess.run([sys.executable, "-I", script, "devices"], capture_output=True, text=True, check=False).stdout
+    lines = [line.removeprefix(LISTED) for line in said.splitlines() if line.startswith(LISTED)]
+    if not lines:
+        return [], "nothing is known of GPUs"
+    found = json.loads(lines[-1])
+    return [(*gpu, number) for number, gpu in enumerate(found["gpus"])], found["nowhere"]
+
+
+def _list(Host):
+    """Prints the GPUs that a host could use, as kind and name, and why there are none."""
+    gpus, nowhere = Host.gpus()
+    print(LISTED + json.dumps({"gpus": [gpu[:2] for gpu in gpus], "nowhere": nowhere}))
+    _end()
+
+
 def serve(Host):
     """Answers requests until standard input ends or a request says quit. Does not return."""
+    if sys.argv[1:] == ["devices"]:
+        _list(Host)
+
     # Ctrl-C in a terminal reaches every process of the group; when to stop is for the parent to say.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

@@ -6,7 +6,7 @@ use crate::error::{SidecarCause, SidecarError};
 use crate::frame::MAX_HEADER;
 use crate::message::{Init, PROTOCOL};
 use crate::process::Process;
-use crate::renderer::{HostOptions, Job, Renderer};
+use crate::renderer::{Device, HostOptions, Job, Renderer};
 use crate::setup;
 use noisefloor::source::SourceIdentity;
 use std::ffi::OsString;
@@ -51,6 +51,7 @@ impl Launch {
             max_depth: job.max_depth,
             frame: job.frame,
             threads: job.threads.map(|n| n.get()),
+            device: job.device.as_ref().map(Device::as_str),
             options: &options.options,
         };
         let init = serde_json::to_vec(&init).map_err(|e| scene(e.to_string()))?;

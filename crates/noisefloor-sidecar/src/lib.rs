@@ -43,14 +43,17 @@
 //! | `quit` | the process ends after its reply |
 //!
 //! `init` has `protocol` (1), `scene`, `seed`, `width`, `height`, `max_depth`, `frame` (of a scene that holds
-//! several), `threads` (or null) and `options`. `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
+//! several), `threads`, `device` (both may be null) and `options`. A host whose samples depend on what computes
+//! says it in `name`, by which sessions are resumed.
+//! `sample` has `tiles`, each with `index`, `x`, `y`, `width`, `height`, `first` and `samples`;
 //! the reply's `samples` has a count for each: at most as many as requested, unless `late` in the reply to
 //! `init` says how many samples, over all pixels of a tile, the renderer takes before it can stop.
 //!
 //! `first_hits` has `index` and `samples`. `adaptive` has `threshold`, `samples` (the most per pixel, or null for
 //! what the scene says) and `seed`: the renderer samples as it likes, until its own noise threshold.
 //!
-//! A host that filters pictures gets `init` with `protocol` and `threads` only, and replies with its `name`. `filter`
+//! A host that filters pictures gets `init` with `protocol`, `threads` and `device` only, and replies with its `name`, and
+//! `warnings` (optional). `filter`
 //! has `width`, `height` and `pictures`, the names of the pictures in the payload.
 //!
 //! # What is left behind
@@ -87,7 +90,7 @@ pub use fuzzing::read_any_reply;
 pub use leftovers::end_all;
 pub use picture_command::PictureCommand;
 pub use picture_filter::{FilterPlan, PictureFilter};
-pub use renderer::{DEFAULT_TIMEOUT, HostOptions, Job, Renderer};
-pub use setup::{HOST, find, install, private_folder, probe};
+pub use renderer::{DEFAULT_TIMEOUT, Device, HostOptions, Job, Renderer};
+pub use setup::{HOST, find, gpus, install, private_folder, probe};
 pub use sidecar::Sidecar;
 pub use threshold_command::ThresholdCommand;

@@ -18,6 +18,7 @@ pub(crate) struct Init<'a> {
     pub(crate) max_depth: Option<u32>,
     pub(crate) frame: Option<i32>,
     pub(crate) threads: Option<usize>,
+    pub(crate) device: Option<&'a str>,
     pub(crate) options: &'a BTreeMap<String, String>,
 }
 
@@ -71,16 +72,19 @@ pub(crate) struct Sampled {
 
 /// To a filter, in place of [`Init`].
 #[derive(Serialize)]
-pub(crate) struct InitFilter {
+pub(crate) struct InitFilter<'a> {
     pub(crate) op: &'static str,
     pub(crate) protocol: u32,
     pub(crate) threads: Option<usize>,
+    pub(crate) device: Option<&'a str>,
 }
 
 /// What a filter says of itself.
 #[derive(Deserialize)]
 pub(crate) struct FilterHello {
     pub(crate) name: String,
+    #[serde(default)]
+    pub(crate) warnings: Vec<String>,
 }
 
 /// The pictures of each frame follow as payload, in this order.

@@ -4,7 +4,7 @@ use crate::call::{Blame, Reply, ask, exactly, rgb};
 use crate::error::{SidecarCause, SidecarError};
 use crate::message::{FilterHello, Filtered, Filtering, InitFilter, PROTOCOL};
 use crate::process::Process;
-use crate::renderer::{DEFAULT_TIMEOUT, Renderer};
+use crate::renderer::{DEFAULT_TIMEOUT, Device, Renderer};
 use crate::setup;
 use noisefloor::{Rgb, internal::printable, tile::MAX_PIXELS};
 use std::num::NonZeroUsize;
@@ -17,17 +17,19 @@ use std::time::Duration;
 const MOST: usize = u32::MAX as usize;
 
 /// How a filter is run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct FilterPlan {
     /// Number of threads; the filter's choice if `None`.
     pub threads: Option<NonZeroUsize>,
+    /// What computes; the processor if `None`.
+    pub device: Option<Device>,
     /// Time limit for one call, including the one that loads the filter.
     pub timeout: Duration,
 }
 
 impl Default for FilterPlan {
     fn default() -> Self {
-        Self { threads: None, timeout: DEFAULT_TIMEOUT }
+        Self { threads: None, device: None, timeout: DEFAULT_TIMEOUT }
     }
 }
 
@@ -44,6 +46,9 @@ pub struct PictureFilter {
     timeout: Duration,
     process: Option<Process>,
     name: String,
+    warnings: Vec<String>,
+    /// It has said its name and warnings.
+    described: bool,
     give_up: Option<Arc<AtomicBool>>,
 }
 
@@ -53,14 +58,17 @@ impl PictureFilter {
     /// # Errors
     /// [`SidecarError`] if the process does not start, or the filter does not load.
     pub fn open(filter: &Renderer, python: &Path, plan: FilterPlan) -> Result<Self, SidecarError> {
-        let init =
-            InitFilter { op: "init", protocol: PROTOCOL, threads: plan.threads.map(NonZeroUsize::get) };
+        let threads = plan.threads.map(NonZeroUsize::get);
+        let device = plan.device.as_ref().map(Device::as_str);
+        let init = InitFilter { op: "init", protocol: PROTOCOL, threads, device };
         let fail = |cause| SidecarError::at_the_start(filter, cause);
         let init = serde_json::to_vec(&init).map_err(|e| fail(SidecarCause::Refused(e.to_string())))?;
         let script = setup::host_script(filter).map_err(|error| fail(error.into()))?;
         let (title, name, timeout) = (filter.title, filter.title.to_owned(), plan.timeout);
         let (python, process, give_up) = (python.to_owned(), None, None);
-        let mut this = Self { title, python, script, init, timeout, process, name, give_up };
+        let (warnings, described) = (Vec::new(), false);
+        let mut this =
+            Self { title, python, script, init, timeout, process, name, warnings, described, give_up };
         this.process = Some(this.start()?);
         Ok(this)
     }
@@ -77,6 +85,11 @@ impl PictureFilter {
     /// Its name and version, as it says.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// What the user should know, such as why it does without a GPU.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// What the filter makes of each frame, of named pictures of `width`×`height` pixels: a picture of the same
@@ -146,7 +159,15 @@ impl PictureFilter {
         let hello = ask::<FilterHello>(&mut process, self.init.clone(), Vec::new(), 0, self.timeout);
         match hello {
             Ok(hello) => {
-                self.name = printable(&hello.header.name).into_owned();
+                let name = printable(&hello.header.name).into_owned();
+                // What another device computes has other bits
+                if std::mem::replace(&mut self.described, true) && name != self.name {
+                    let what = format!("after a restart it is {name}, before it was {}", self.name);
+                    return Err(self.error(SidecarCause::Wrong { what }, process.last_words()));
+                }
+                self.name = name;
+                self.warnings =
+                    hello.header.warnings.iter().map(|warning| printable(warning).into_owned()).collect();
                 Ok(process)
             }
             Err((_, cause)) => Err(self.error(cause, process.last_words())),

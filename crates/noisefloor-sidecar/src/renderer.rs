@@ -1,9 +1,12 @@
 //! What an adapter declares about its renderer, and what a caller asks of it.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
+use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Duration;
 
 /// Default time limit for one call: half an hour. Renderers are slow; processes that hang are rare.
@@ -34,6 +37,53 @@ impl Renderer {
     }
 }
 
+/// What computes, where a renderer or a denoiser has the choice.
+///
+/// ```
+/// use noisefloor_sidecar::Device;
+///
+/// assert_eq!("gpu".parse(), Ok(Device::GPU));
+/// assert_eq!("H200".parse::<Device>()?.to_string(), "H200");
+/// # Ok::<(), String>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Device(Cow<'static, str>);
+
+impl Device {
+    /// A GPU that works, if there is one; the host says why not, if there is none.
+    pub const AUTO: Self = Self(Cow::Borrowed("auto"));
+    /// The processor.
+    pub const CPU: Self = Self(Cow::Borrowed("cpu"));
+    /// A GPU, or an error.
+    pub const GPU: Self = Self(Cow::Borrowed("gpu"));
+
+    /// As it was written.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl FromStr for Device {
+    type Err = String;
+
+    /// `auto`, `cpu`, `gpu`, the number of a GPU as `noisefloor doctor` lists them, or a part of its name or kind.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.trim().is_empty() || text.len() > 200 || text.chars().any(char::is_control) {
+            return Err(
+                "a device is `auto`, `cpu`, `gpu`, the number of a GPU, or a part of its name".to_owned()
+            );
+        }
+        let known = [Self::AUTO, Self::CPU, Self::GPU].into_iter().find(|known| known.0 == text);
+        Ok(known.unwrap_or_else(|| Self(Cow::Owned(text.trim().to_owned()))))
+    }
+}
+
+impl fmt::Display for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
 /// What to render and how, for any renderer. Made by [`Job::new`]; all fields can then be changed.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -51,6 +101,8 @@ pub struct Job {
     pub frame: Option<i32>,
     /// Number of threads; the renderer's choice if `None`.
     pub threads: Option<NonZeroUsize>,
+    /// What renders; if `None`, what the scene says, or else the processor.
+    pub device: Option<Device>,
     /// Time limit for one call, including the one that loads the scene.
     pub timeout: Duration,
 }
@@ -66,6 +118,7 @@ impl Job {
             max_depth: None,
             frame: None,
             threads: None,
+            device: None,
             timeout: DEFAULT_TIMEOUT,
         }
     }

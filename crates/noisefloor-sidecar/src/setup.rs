@@ -4,6 +4,8 @@ use crate::error::SetupError;
 use crate::renderer::Renderer;
 use crate::run::run;
 use etcetera::BaseStrategy;
+use noisefloor::internal::printable;
+use serde::Deserialize;
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io::Write;
@@ -53,6 +55,44 @@ pub fn probe(renderer: &Renderer, python: &Path) -> Result<String, SetupError> {
         Err(error) => error.to_string(),
     };
     Err(SetupError::Broken { title: renderer.title, python: python.to_owned(), why })
+}
+
+/// The GPUs that a renderer could use in an interpreter, a line each, with the numbers by which a [`Device`](crate::Device) names
+/// them; or one that says why there are none. Loads the renderer.
+///
+/// # Errors
+/// [`SetupError::Broken`] with the interpreter's output.
+pub fn gpus(renderer: &Renderer, python: &Path) -> Result<Vec<String>, SetupError> {
+    let script = host_script(renderer)?;
+    let mut command = Command::new(python);
+    command.arg("-I").arg(script).arg("devices");
+    let (mut said, mut listed) = (Said::default(), None);
+    let outcome = run(command, PROBE_TIME, |line| {
+        said.push(line);
+        listed = line.strip_prefix(LISTED).map(str::to_owned).or_else(|| listed.take());
+    });
+    let broken = |why| SetupError::Broken { title: renderer.title, python: python.to_owned(), why };
+    let status = outcome.map_err(|error| broken(error.to_string()))?;
+    let found = listed.and_then(|json| serde_json::from_str::<Listed>(&json).ok());
+    let Some(Listed { gpus, nowhere }) = found else {
+        return Err(broken(format!("{status}; it lists no GPUs: {}", said.text())));
+    };
+    if gpus.is_empty() {
+        return Ok(vec![format!("no GPU: {}", printable(&nowhere))]);
+    }
+    let line = |(number, (kind, name)): (usize, &(String, String))| {
+        printable(&format!("GPU {number}: {name} ({kind})")).into_owned()
+    };
+    Ok(gpus.iter().enumerate().map(line).collect())
+}
+
+/// What begins the line of `HOST_SCRIPT devices`, as `host.py` says.
+const LISTED: &str = "noisefloor GPUs: ";
+
+#[derive(Deserialize)]
+struct Listed {
+    gpus: Vec<(String, String)>,
+    nowhere: String,
 }
 
 /// The folder of a renderer's private environment, whether it exists or not. It depends on the requirements.

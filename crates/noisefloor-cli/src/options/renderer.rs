@@ -7,6 +7,7 @@ use crate::sources::{PtwneOptions, Resources, SourceJob, SourceKind};
 use crate::spell::JobPath;
 use clap::{Args, ValueEnum, ValueHint};
 use noisefloor_ptwne::{Estimator, Filter, Sampling};
+use noisefloor_sidecar::Device;
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::time::Duration;
@@ -37,6 +38,10 @@ pub struct RendererArgs {
     /// Threads [default: one a core].
     #[arg(long, value_name = "N", value_parser = values::threads)]
     threads: Option<NonZeroUsize>,
+    /// Other renderers: what renders: `auto`, a GPU if one works; `cpu`; `gpu`; the number of a GPU, as `noisefloor doctor` lists them,
+    /// or a part of its name [default: what Blender's scene says, else cpu].
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<Device>,
     /// Longest path in segments: 1 is light seen directly, 2 is direct light [default: what the scene file
     /// says, else 65].
     #[arg(long, value_name = "N")]
@@ -112,11 +117,11 @@ impl RendererArgs {
         let resources = Resources { threads: self.threads, timeout: self.timeout };
         let scene = scene.map(JobPath::from);
         let scene_files = self.scene_files.check();
-        let Self { seed, size, max_depth, .. } = self;
-        Ok((
-            SourceJob { kind, scene, seed, same_seed: false, frame: None, size, max_depth, scene_files },
-            resources,
-        ))
+        let Self { seed, size, max_depth, device, .. } = self;
+        let device = device.map(|device| device.to_string());
+        let (same_seed, frame) = (false, None);
+        let job = SourceJob { kind, scene, seed, same_seed, frame, size, max_depth, device, scene_files };
+        Ok((job, resources))
     }
 
     /// Whether our own path tracer renders.
@@ -148,6 +153,7 @@ impl RendererArgs {
             ("--filter", self.filter.is_some() && !ptwne),
             ("--clamp", self.clamp.is_some() && !ptwne),
             ("--size", self.size.is_some() && !self.source.takes_size()),
+            ("--device", self.device.is_some() && !matches!(self.source, SourceKind::Adapter(_))),
             ("--max-depth", self.max_depth.is_some() && !self.source.takes_depth()),
         ];
         if let Some((option, _)) = given.iter().find(|(_, given)| *given) {

@@ -11,7 +11,7 @@ import host
 
 class Fake:
     def __init__(self, init):
-        self.info = {"name": "Fake filter, threads %s" % init["threads"]}
+        self.info = {"name": "Fake filter, threads %s" % init["threads"], "warnings": ["on %s" % init["device"]]}
 
     def filter(self, width, height, frames):
         return [self.one(pictures) for pictures in frames]

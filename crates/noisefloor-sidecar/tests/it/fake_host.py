@@ -40,15 +40,27 @@ def send(header, payload=0):
 
 
 class Fake:
+    @staticmethod
+    def gpus():
+        """Two, of which the first does not work."""
+        print("a library that talks")
+        return [("CUDA", "Alpha", 0), ("OPTIX", "Beta\x1b[31m 2", 1)], "there is no driver"
+
+    @staticmethod
+    def trial(gpu):
+        if gpu[1] == "Alpha":
+            raise MemoryError("too little memory")
+
     def __init__(self, init):
         self.seed, self.options = init["seed"], init["options"]
+        gpu, note = host.pick(init["device"] or "cpu", *self.gpus(), self.trial)
         self.info = {
-            "name": "Fake 1",
+            "name": "Fake 1" + (" on " + gpu[1] if gpu else ""),
             "width": init["width"] or 48,
             "height": init["height"] or 40,
             "unit": "samples-per-pixel",
             "repeats": "samples",
-            "warnings": ["max_depth %s, threads %s" % (init["max_depth"], init["threads"])],
+            "warnings": ["max_depth %s, threads %s" % (init["max_depth"], init["threads"])] + ([note] if note else []),
         }
         starts = 0
         if "pids" in self.options:

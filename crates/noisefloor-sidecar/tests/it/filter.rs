@@ -1,7 +1,7 @@
 //! Filters of pictures.
 
 use noisefloor::Rgb;
-use noisefloor_sidecar::{FilterPlan, PictureFilter, Renderer, SidecarCause, SidecarError};
+use noisefloor_sidecar::{Device, FilterPlan, PictureFilter, Renderer, SidecarCause, SidecarError};
 use noisefloor_testkit::require_python;
 
 const FILTER: Renderer = Renderer {
@@ -24,6 +24,9 @@ fn a_filter_turns_pictures_into_one_whatever_happened_before() {
     let Some(python) = require_python() else { return };
     let mut filter = PictureFilter::open(&FILTER, &python, FilterPlan::default()).unwrap();
     assert_eq!(filter.name(), "Fake filter, threads None");
+    assert_eq!(filter.warnings(), ["on None"]);
+    let plan = FilterPlan { device: Some(Device::AUTO), ..FilterPlan::default() };
+    assert_eq!(PictureFilter::open(&FILTER, &python, plan).unwrap().warnings(), ["on auto"]);
     let doubled = vec![[0.5, 2.0, 4.0], [6.0; 3]];
     assert_eq!(apply(&mut filter, 0.25).unwrap(), doubled);
     let albedo = [[0.0; 3]; 2];

@@ -19,7 +19,7 @@ pub(crate) const SIZE: (usize, usize) = (48, 40);
 
 /// Calls of the fake renderer, with a folder for its files.
 pub(crate) struct Fake {
-    python: PathBuf,
+    pub(crate) python: PathBuf,
     pub(crate) folder: TempDir,
     pub(crate) options: BTreeMap<String, String>,
     pub(crate) job: Job,

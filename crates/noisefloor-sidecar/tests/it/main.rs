@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
 mod command;
+mod devices;
 mod failures;
 mod filter;
 mod kit;

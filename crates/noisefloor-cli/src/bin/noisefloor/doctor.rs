@@ -3,7 +3,7 @@
 use noisefloor_cli::say::{note, say};
 use noisefloor_cli::sources::ADAPTERS;
 use noisefloor_denoise::OIDN;
-use noisefloor_sidecar::{Renderer, SetupError, find, install, probe};
+use noisefloor_sidecar::{Renderer, SetupError, find, gpus, install, probe};
 use std::process::ExitCode;
 
 /// What to look at, or to install.
@@ -54,9 +54,15 @@ fn notes(renderer: &Renderer) -> Vec<String> {
 fn examine(renderer: &Renderer) -> Row {
     let name = renderer.name;
     let python = find(renderer);
+    let found = python.as_ref().ok().cloned();
     let place = python.as_ref().map_or_else(|_| "-".to_owned(), |python| python.display().to_string());
     let (usable, version, notes, broken) = match python.and_then(|python| probe(renderer, &python)) {
-        Ok(version) => ("yes", version, notes(renderer), false),
+        Ok(version) => {
+            let devices = found.as_ref().map(|python| gpus(renderer, python));
+            // A renderer that works is no worse for what it does not say
+            let devices = devices.and_then(Result::ok).unwrap_or_default();
+            ("yes", version, [notes(renderer), devices].concat(), false)
+        }
         Err(SetupError::Missing { .. }) => {
             ("no", "-".to_owned(), vec![format!("not installed: noisefloor doctor --install {name}")], false)
         }

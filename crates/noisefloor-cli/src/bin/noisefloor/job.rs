@@ -51,6 +51,9 @@ pub enum CriterionJob {
         lost: f64,
         /// Of the finished picture.
         passes: DenoisePasses,
+        /// What denoises, as it was typed.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        device: Option<String>,
     },
     Rival(RivalSpec),
 }

@@ -22,6 +22,7 @@ use noisefloor_cli::bars::Log;
 use noisefloor_cli::files::read_reference;
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::note;
+use noisefloor_cli::options::denoiser::filter_plan;
 use noisefloor_cli::say::one_line;
 use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_all_on_signal};
 use noisefloor_cli::sources::{Opened, Source};
@@ -66,13 +67,10 @@ fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
     let reference = against.map(|path| read_reference(path, (*width, *height))).transpose()?;
     let (criterion, denoised) = match (&job.criterion, job.criterion.of(oracle.as_ref())) {
         (_, Some(criterion)) => (criterion, None),
-        (CriterionJob::Denoised { lost, passes }, None) => {
-            let (criterion, denoised) = denoised::begin(
-                &mut source,
-                job.source.first_hits_spp(),
-                (*lost, *passes),
-                resources.timeout,
-            )?;
+        (CriterionJob::Denoised { lost, passes, device }, None) => {
+            let plan = filter_plan(device.as_deref(), resources.timeout)?;
+            let (criterion, denoised) =
+                denoised::begin(&mut source, job.source.first_hits_spp(), (*lost, *passes), plan)?;
             (criterion, Some(denoised))
         }
         (_, None) => bail!("no model was read"),

@@ -47,7 +47,7 @@ pub enum TuneCriterion {
     /// The noise of the picture.
     Noise(Box<Oracle>),
     /// What is wrong with the denoised picture, in JODs that its worst square may have lost.
-    Denoised { lost: f64 },
+    Denoised { lost: f64, device: Option<String> },
 }
 
 /// What is sought.
@@ -331,7 +331,7 @@ fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
         (TuneCriterion::Noise(oracle), Some(ratio)) => {
             format!("{} of people see none: {ratio:.2} of what they do not see", oracle.people())
         }
-        (TuneCriterion::Denoised { lost }, Some(ratio)) => {
+        (TuneCriterion::Denoised { lost, .. }, Some(ratio)) => {
             format!("the denoised picture may have lost {:.3} JOD, {lost} are allowed", ratio * lost)
         }
     };

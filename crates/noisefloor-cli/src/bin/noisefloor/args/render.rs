@@ -19,6 +19,7 @@ use noisefloor_cli::sources::SourceJob;
 use noisefloor_cli::spell::JobPath;
 use noisefloor_eyes::Person;
 use noisefloor_farm::Frames;
+use noisefloor_sidecar::Device;
 use std::convert::Infallible;
 use std::ffi::OsString;
 use std::net::SocketAddr;
@@ -88,6 +89,9 @@ pub struct RenderArgs {
     /// included. What both halves miss, such as a caustic that no sample has found, it cannot know.
     #[arg(long, value_enum, conflicts_with_all = ["model", "threshold", "schedule", "criterion", "audience"])]
     denoise: Option<DenoiserChoice>,
+    /// With --denoise: what denoises, as `--device` says what renders [default: cpu].
+    #[arg(long, value_name = "DEVICE", requires = "denoise")]
+    denoise_device: Option<Device>,
     /// No progress bar and no summary.
     #[arg(long, short)]
     quiet: bool,
@@ -288,11 +292,16 @@ impl RenderArgs {
         };
         let audience = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
         let limits = self.verdicts.limits(self.denoise.is_some(), &self.renderer, self.preset, audience)?;
+        let device = self.denoise_device.map(|device| device.to_string());
         let criterion = match (self.denoise, self.verdicts.criterion) {
             (Some(_), _) => {
                 let (lost, passes) = (self.verdicts.lost, self.verdicts.denoise_passes);
                 let draft = self.preset == Some(Preset::Draft);
-                CriterionJob::Denoised { lost: if draft { lost.max(DRAFT_LOST) } else { lost }, passes }
+                CriterionJob::Denoised {
+                    lost: if draft { lost.max(DRAFT_LOST) } else { lost },
+                    passes,
+                    device,
+                }
             }
             (None, CriterionChoice::Oracle) => {
                 let OracleArgs { model, people, .. } = self.oracle;

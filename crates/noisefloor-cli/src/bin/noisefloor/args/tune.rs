@@ -17,6 +17,7 @@ use noisefloor_cli::refuse;
 use noisefloor_cli::sources::SourceKind;
 use noisefloor_denoise::DEFAULT_JODS_LOST;
 use noisefloor_farm::Frames;
+use noisefloor_sidecar::Device;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -67,6 +68,9 @@ pub struct TuneArgs {
     /// --install oidn`).
     #[arg(long, value_enum, conflicts_with_all = ["model", "threshold", "people"])]
     denoise: Option<DenoiserChoice>,
+    /// With --denoise: what denoises, as `--device` says what renders [default: cpu].
+    #[arg(long, value_name = "DEVICE", requires = "denoise")]
+    denoise_device: Option<Device>,
     /// With --denoise: just-objectionable differences (JOD) that a square of 64 pixels may have lost.
     #[arg(long, value_name = "JOD", requires = "denoise", default_value_t = DEFAULT_JODS_LOST, value_parser = values::jods)]
     lost: f64,
@@ -187,7 +191,12 @@ impl TuneArgs {
         };
         let (criterion, viewing, audience) = if self.denoise.is_some() {
             self.eyes.unused("--denoise")?;
-            (TuneCriterion::Denoised { lost: self.lost }, self.viewing.or_default(), Audience::TRAINED)
+            let device = self.denoise_device.map(|device| device.to_string());
+            (
+                TuneCriterion::Denoised { lost: self.lost, device },
+                self.viewing.or_default(),
+                Audience::TRAINED,
+            )
         } else {
             let said = [("--viewing", self.viewing.typed().is_some())];
             let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;

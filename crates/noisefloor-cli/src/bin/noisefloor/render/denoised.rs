@@ -3,7 +3,7 @@
 use crate::job::FIRST_DENOISED;
 use crate::output::Denoised;
 use noisefloor::{ProgressiveSource, Session, StoppingCriterion};
-use noisefloor_cli::say::say;
+use noisefloor_cli::say::{note, say};
 use noisefloor_denoise::{
     DEFAULT_JODS_LOST, DenoisePasses, DenoisedQuality, Guides, MirrorMean, Oidn, spp_with_denoising,
 };
@@ -17,15 +17,15 @@ const LONG: Duration = Duration::from_secs(30);
 /// What is saved must be more than the estimate may be wrong by.
 const WORTH_SAYING: f64 = 2.0;
 
-/// Starts the denoiser. First hits take at most so many rays, a tile may lose so many JODs, and a call may take so long.
+/// Starts the denoiser. First hits take at most so many rays, a tile may lose so many JODs.
 pub(super) fn begin(
     source: &mut impl ProgressiveSource,
     rays: u64,
     (lost, passes): (f64, DenoisePasses),
-    timeout: Duration,
+    plan: FilterPlan,
 ) -> anyhow::Result<(Box<dyn StoppingCriterion + Send>, Denoised)> {
-    let plan = FilterPlan { timeout, ..FilterPlan::default() };
     let (mut denoiser, give_up) = (Oidn::start(plan)?, Arc::<AtomicBool>::default());
+    denoiser.warnings().iter().for_each(|warning| note!("warning: {warning}"));
     denoiser.give_up_when(Arc::clone(&give_up));
     let mut denoiser = Arc::new(Mutex::new(denoiser));
     let mut criterion = DenoisedQuality::new(Arc::clone(&denoiser), lost).shown_as_mean_of(passes);

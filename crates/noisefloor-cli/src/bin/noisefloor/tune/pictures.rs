@@ -8,13 +8,14 @@ use noisefloor::source::SourceIdentity;
 use noisefloor::stills::{StillError, StillWarning};
 use noisefloor::tune::{Excess, Knob, PicturePair, most_in_squares};
 use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
+use noisefloor_cli::options::denoiser::filter_plan;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::{Opened, Resources, Source, SourceJob, SourceKind};
 use noisefloor_denoise::{
     DenoisedError, DenoisedExcess, DenoisedHalves, Denoiser, Guides, NoisyPicture, Oidn,
 };
-use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
+use noisefloor_sidecar::ThresholdCommand;
 use std::fs::File;
 use std::mem::discriminant;
 use std::time::Duration;
@@ -278,9 +279,10 @@ impl<'a> Judges<'a> {
     pub fn begin(criterion: &'a TuneCriterion, params: Params, timeout: Duration) -> anyhow::Result<Self> {
         let denoiser = match criterion {
             TuneCriterion::Noise(_) => None,
-            TuneCriterion::Denoised { .. } => {
-                let plan = FilterPlan { timeout, ..FilterPlan::default() };
-                Some(Oidn::start(plan)?)
+            TuneCriterion::Denoised { device, .. } => {
+                let oidn = Oidn::start(filter_plan(device.as_deref(), timeout)?)?;
+                oidn.warnings().iter().for_each(|warning| note!("warning: {warning}"));
+                Some(oidn)
             }
         };
         Ok(Self { criterion, params, denoiser, warned: Vec::new() })
@@ -302,7 +304,7 @@ impl<'a> Judges<'a> {
         let film = viewing.frames_per_second().map(|rate| format!(", as a frame of {rate} a second"));
         let film = film.unwrap_or_default();
         match (self.criterion, &self.denoiser) {
-            (TuneCriterion::Denoised { lost }, Some(denoiser)) => format!(
+            (TuneCriterion::Denoised { lost, .. }, Some(denoiser)) => format!(
                 "at most {lost} JOD lost after {}{film}, by the vision model: nobody has been asked",
                 denoiser.name()
             ),
@@ -312,7 +314,7 @@ impl<'a> Judges<'a> {
             (TuneCriterion::Noise(oracle), _) => {
                 format!("for {} of people, {viewing}", oracle.people())
             }
-            (TuneCriterion::Denoised { lost }, None) => format!("at most {lost} JOD lost"),
+            (TuneCriterion::Denoised { lost, .. }, None) => format!("at most {lost} JOD lost"),
         }
     }
 
@@ -353,7 +355,7 @@ impl<'a> Judges<'a> {
         let spp = spp.map(|each| 2.0 * each);
         let mean = halves.mean().to_vec();
         match (self.criterion, &mut self.denoiser) {
-            (TuneCriterion::Denoised { lost }, Some(denoiser)) => {
+            (TuneCriterion::Denoised { lost, .. }, Some(denoiser)) => {
                 let wants = denoiser.wants();
                 let (hits, clean) = match &guides {
                     Some(guides) => {
