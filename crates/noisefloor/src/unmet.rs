@@ -21,6 +21,7 @@
 use crate::display::{Display, luminance};
 use crate::evidence::TilePlanes;
 use crate::film::Film;
+use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use ndarray::Array2;
 use noisefloor_vision::Viewing;
@@ -72,8 +73,10 @@ impl MetOnce {
                 rows.find_highest();
             }
             let [a, b] = &halves;
-            for x in 0..tile.width {
-                let excess = [a.here()[x + 1] - b.highest_around(x), b.here()[x + 1] - a.highest_around(x)];
+            let own = a.here().iter().zip(b.here());
+            let around = a.highest.iter().zip(&b.highest);
+            for (x, ((a, b), (around_a, around_b))) in own.zip(around).enumerate() {
+                let excess = [a - around_b, b - around_a];
                 if excess[0].max(excess[1]) > 0.0 {
                     let counts = film.pixel_counts(tile.index, y * grid.width() + tile.x + x);
                     let by_sample = excess.into_iter().zip(counts).map(|(e, n)| e * n as f32);
@@ -132,14 +135,15 @@ impl MetOnce {
 /// Three rows of a half, each with a pixel more to both sides; the picture's edge repeats.
 struct Rows {
     rows: [Vec<f32>; 3],
-    /// The largest of each column.
+    /// The largest of each column, and for each pixel of the tile that of the nine around it.
+    columns: Vec<f32>,
     highest: Vec<f32>,
 }
 
 impl Rows {
     fn new(width: usize) -> Self {
         let row = || vec![0.0; width + 2];
-        Self { rows: [row(), row(), row()], highest: row() }
+        Self { rows: [row(), row(), row()], columns: row(), highest: vec![0.0; width] }
     }
 
     /// Forgets the uppermost row, and takes row `y` of the picture.
@@ -147,26 +151,29 @@ impl Rows {
         self.rows.rotate_left(1);
         let [.., last] = &mut self.rows;
         let Some(row) = film.half_row(half, y) else { return };
-        let end = film.grid().width() - 1;
-        for (x, value) in last.iter_mut().enumerate() {
-            *value = luminance(row[(tile.x + x).saturating_sub(1).min(end)]).max(0.0);
+        let light = |pixel: Rgb| luminance(pixel).max(0.0);
+        let (left, right) = (tile.x.saturating_sub(1), (tile.x + tile.width).min(film.grid().width() - 1));
+        let [first, inner @ .., end] = &mut last[..] else { return };
+        for (value, &pixel) in inner.iter_mut().zip(&row[tile.x..]) {
+            *value = light(pixel);
         }
+        (*first, *end) = (light(row[left]), light(row[right]));
     }
 
     fn find_highest(&mut self) {
         let [above, here, below] = &self.rows;
-        for (x, highest) in self.highest.iter_mut().enumerate() {
-            *highest = above[x].max(here[x]).max(below[x]);
+        for (((highest, above), here), below) in self.columns.iter_mut().zip(above).zip(here).zip(below) {
+            *highest = above.max(*here).max(*below);
+        }
+        for (highest, three) in self.highest.iter_mut().zip(self.columns.windows(3)) {
+            *highest = three[0].max(three[1]).max(three[2]);
         }
     }
 
+    /// The row in the middle, without the pixels beside the tile.
     fn here(&self) -> &[f32] {
-        &self.rows[1]
-    }
-
-    /// The largest of the nine values around a pixel of the tile.
-    fn highest_around(&self, x: usize) -> f32 {
-        self.highest[x].max(self.highest[x + 1]).max(self.highest[x + 2])
+        let row = &self.rows[1];
+        &row[1..row.len() - 1]
     }
 }
 

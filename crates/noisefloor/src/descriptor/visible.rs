@@ -26,6 +26,7 @@ use ndarray::{Array2, ArrayView2, s};
 use noisefloor_vision::{
     ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel, VisionWorkspace,
 };
+use rayon::prelude::*;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
@@ -225,7 +226,7 @@ impl Visible {
         let of_tile = |tile: &Described| {
             picture.worst(picture.blocks(tile.place), tile.window).amplitude(tile.spp, self.crest) / UNIT
         };
-        tiles.iter().map(of_tile).collect()
+        tiles.par_iter().map(of_tile).collect()
     }
 
     /// Appends to each tile's own numbers, of which the first is that of `noises`, those of the picture that the tiles

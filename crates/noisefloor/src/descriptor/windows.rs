@@ -8,10 +8,13 @@
 use super::kind::Described;
 use crate::tile::Tile;
 use noisefloor_vision::DifferenceBand;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Edge of a block in pixels of the picture, from its top left on: a seventh of a window on a monitor.
 pub(super) const BLOCK: usize = 4;
+/// Rows of blocks that one thread looks at, at least: those of a tile.
+const ROWS_AT_ONCE: usize = 16;
 
 /// Columns or rows of blocks that pixels from..from + count lie in.
 fn blocks_of(from: usize, count: usize) -> Range<usize> {
@@ -101,14 +104,20 @@ impl PictureContrast {
                 }
             }
         }
-        for y in 1..=rows.len() {
+        // Along the rows, each by itself, and then down, where all columns of a row can be added at once
+        tables.par_chunks_exact_mut(stride).for_each(|row| {
             let mut along = [0.0; 3];
-            for x in 1..stride {
-                let at = y * stride + x;
-                for of in 0..3 {
-                    along[of] += tables[at][of];
-                    tables[at][of] = along[of] + tables[at - stride][of];
+            for entry in row {
+                for (along, value) in along.iter_mut().zip(entry) {
+                    *along += *value;
+                    *value = *along;
                 }
+            }
+        });
+        for y in 1..=rows.len() {
+            let (above, row) = tables[(y - 1) * stride..(y + 1) * stride].split_at_mut(stride);
+            for (entry, above) in row.as_flattened_mut().iter_mut().zip(above.as_flattened()) {
+                *entry += above;
             }
         }
         Self { rows, columns, tables }
@@ -125,8 +134,27 @@ impl PictureContrast {
         (rows, columns): (Range<usize>, Range<usize>),
         window: usize,
     ) -> WindowContrast {
-        let blocks = rows.flat_map(|y| columns.clone().map(move |x| (y, x)));
-        blocks.map(|(y, x)| self.around(y, x, window)).fold(WindowContrast::default(), WindowContrast::or)
+        let worst = |row| self.worst_in_row(row, columns.clone(), window);
+        rows.into_par_iter()
+            .with_min_len(ROWS_AT_ONCE)
+            .map(worst)
+            .reduce(WindowContrast::default, WindowContrast::or)
+    }
+
+    /// The same of blocks of one row.
+    fn worst_in_row(&self, row: usize, columns: Range<usize>, window: usize) -> WindowContrast {
+        if !self.rows.contains(&row) {
+            return WindowContrast::default();
+        }
+        let stride = self.columns.len() + 1;
+        let (top, bottom) = span(row, &self.rows, window);
+        let [above, below] = [top, bottom].map(|y| &self.tables[y * stride..(y + 1) * stride]);
+        let columns = columns.filter(|column| self.columns.contains(column));
+        let around = |column| {
+            let (left, right) = span(column, &self.columns, window);
+            mean([above, below], left, right)
+        };
+        columns.map(around).fold(WindowContrast::default(), WindowContrast::or)
     }
 
     /// The worst window around a block of each of the zones that the picture divides into, with as many blocks as it has:
@@ -142,34 +170,35 @@ impl PictureContrast {
             (self.worst((rows, columns), window), blocks)
         };
         let (rows, columns) = (&self.rows, &self.columns);
-        divide(rows)
-            .flat_map(|rows| divide(columns).map(move |columns| (rows.clone(), columns)))
-            .map(zone)
-            .collect()
+        let zones = divide(rows).flat_map(|rows| divide(columns).map(move |columns| (rows.clone(), columns)));
+        zones.map(zone).collect()
     }
 
     /// The mean over a window of `edge` blocks around a block; at the edge of the picture, over the nearest window
     /// that lies in it.
     pub(super) fn around(&self, row: usize, column: usize, edge: usize) -> WindowContrast {
-        let span = |at: usize, of: &Range<usize>| {
-            let edge = edge.min(of.len());
-            let start = (at - of.start).saturating_sub(edge / 2).min(of.len() - edge);
-            (start, start + edge)
-        };
-        if self.rows.is_empty() || !self.rows.contains(&row) || !self.columns.contains(&column) {
-            return WindowContrast::default();
+        if self.columns.contains(&column) {
+            self.worst_in_row(row, column..column + 1, edge)
+        } else {
+            WindowContrast::default()
         }
-        let ((top, bottom), (left, right)) = (span(row, &self.rows), span(column, &self.columns));
-        let stride = self.columns.len() + 1;
-        let sum = |of: usize| {
-            let at = |y: usize, x: usize| self.tables[y * stride + x][of];
-            at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left)
-        };
-        let pixels = sum(2);
-        // Differences of sums may miss 0 by their rounding
-        let mean = |of: usize| if pixels > 0.0 { (sum(of) / pixels).max(0.0) } else { 0.0 };
-        WindowContrast { square: mean(0), fourth: mean(1) }
     }
+}
+
+/// Where a window of `edge` blocks around one begins and ends, counted in the blocks of the picture: the nearest that lies in it.
+fn span(at: usize, of: &Range<usize>, edge: usize) -> (usize, usize) {
+    let edge = edge.min(of.len());
+    let start = (at - of.start).saturating_sub(edge / 2).min(of.len() - edge);
+    (start, start + edge)
+}
+
+/// The mean over a window, of the rows of the tables above it and at its lower end.
+fn mean([above, below]: [&[[f64; 3]]; 2], left: usize, right: usize) -> WindowContrast {
+    let sum = |of: usize| below[right][of] - above[right][of] - below[left][of] + above[left][of];
+    let pixels = sum(2);
+    // Differences of sums may miss 0 by their rounding
+    let mean = |of: usize| if pixels > 0.0 { (sum(of) / pixels).max(0.0) } else { 0.0 };
+    WindowContrast { square: mean(0), fourth: mean(1) }
 }
 
 /// Pixels of a block that lie within from..from + count.

@@ -254,8 +254,10 @@ fn by_blocks(
     most: usize,
     pixel: &(impl Fn(usize, usize) -> Option<NoisyPixel> + Sync),
 ) -> Option<(LogAverage, f64)> {
-    let grids: Vec<[Option<LogAverage>; 2]> =
-        (0..GRIDS.len()).map(|grid| on_grid(&Lattice::new(size, grid, most), pixel)).collect();
+    let grids: Vec<[Option<LogAverage>; 2]> = (0..GRIDS.len())
+        .into_par_iter()
+        .map(|grid| on_grid(&Lattice::new(size, grid, most), pixel))
+        .collect();
     let [found, coarse] = [0, 1].map(|i| grids.iter().filter_map(|of| of[i]).collect::<Vec<LogAverage>>());
     let mean = mean_log(&found)?;
     let count = found.len() as f64;

@@ -180,7 +180,7 @@ impl Sides {
         let mut all: Vec<[[Vec<f64>; 2]; 4]> = tiles.into_par_iter().map(sides).collect();
         let typical = level(&all.as_flattened().as_flattened().concat());
         let lines = all.as_flattened_mut().as_flattened_mut();
-        lines.iter_mut().flatten().for_each(|v| *v = v.max(0.0) / (typical + v.max(0.0)));
+        lines.par_iter_mut().flatten_iter().for_each(|v| *v = v.max(0.0) / (typical + v.max(0.0)));
         Self(all)
     }
 
@@ -233,7 +233,8 @@ pub(super) fn mix_up(film: &Film) -> Option<MixUp> {
     let alone = [UpsideDown, Mirrored, Turned, Transposed].map(|mix_up| (mix_up, 1));
     // To the right, or to the left
     let moved = [(Shifted, 1), (Shifted, grid.columns() - 1)];
-    let found = alone.into_iter().chain(moved);
-    let found = found.filter_map(|(mix_up, torn)| Some((mix_up, sides.improvement(grid, mix_up, torn)?)));
-    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|found| found.0)
+    let all: Vec<(MixUp, usize)> = alone.into_iter().chain(moved).collect();
+    let found = |(mix_up, torn)| Some((mix_up, sides.improvement(grid, mix_up, torn)?));
+    let found: Vec<Option<(MixUp, f64)>> = all.into_par_iter().map(found).collect();
+    found.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1)).map(|found| found.0)
 }

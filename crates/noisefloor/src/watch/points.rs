@@ -2,9 +2,12 @@
 
 use crate::display::luminance;
 use crate::tile::{Tile, TileGrid, TilePixels};
+use rayon::prelude::*;
 
 /// Pixels of a picture up to which one pixel in 4×4 is watched.
 const SMALL: usize = 160 * 160;
+/// Logarithms that one thread takes, at least.
+const LOGS_AT_ONCE: usize = 4096;
 
 /// Where watched pixels lie: in the middle of squares of this edge.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +51,10 @@ pub(super) fn light(mean: TilePixels<'_>, (x, y): (usize, usize)) -> [f32; 3] {
 /// A typical one of these values: the geometric mean of those above 0, which a few lamps and fireflies hardly
 /// move. 1 if there is none.
 pub(super) fn level(values: &[f64]) -> f64 {
-    let lit = values.iter().filter(|&&value| value > 0.0 && value.is_finite());
-    let (sum, count) = lit.fold((0.0, 0u64), |(sum, count), value| (sum + value.ln(), count + 1));
+    let log = |&value: &f64| (value > 0.0 && value.is_finite()).then(|| value.ln());
+    let logs: Vec<Option<f64>> = values.par_iter().with_min_len(LOGS_AT_ONCE).map(log).collect();
+    // In their order, so that the sum is the same with any number of threads
+    let (sum, count) =
+        logs.into_iter().flatten().fold((0.0, 0u64), |(sum, count), log| (sum + log, count + 1));
     if count > 0 { (sum / count as f64).exp() } else { 1.0 }
 }
