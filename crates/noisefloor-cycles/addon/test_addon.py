@@ -498,6 +498,56 @@ class Addon(unittest.TestCase):
         self.assertGreaterEqual(last[0, 0] * 0.06**2, 1)
         self.assertTrue(1 <= last[0, 3] * 0.12**2 < 2.5, last)
 
+    def test_a_gpu_is_called_for_few_parts_and_each_place_gets_what_it_needs(self):
+        """Cycles' calls cost a GPU a start each. By a fake: the processor renders what a GPU would be called for."""
+        scene, real = room(closed=True), denoise.gpu
+        scene.noisefloor.max_samples, wanted = 1 << 20, {}
+        # Single cells here and there, each with a need of its own
+        for number, place in enumerate([(0, 0), (0, 3), (1, 1), (2, 0), (2, 3)]):
+            wanted[place] = 0.2 * 0.9**number
+
+        class Excess:
+            def __init__(self, effort):
+                ratio = lambda place: (wanted[place] ** -2 / effort[place]) ** 0.5
+                self.found = [(32 * x, 32 * y, 32, 32, ratio((y, x))) for y, x in wanted]
+                self.ratio = max(ratio for *_, ratio in self.found)
+
+            def squares(self):
+                return self.found
+
+            def map(self):
+                return numpy.zeros(SIZE[::-1], numpy.float32)
+
+        efforts, calls = [], {}
+
+        def excess(self, pair):
+            efforts.append(hooks.state.frame.effort.copy())
+            return Excess(efforts[-1])
+
+        known, judging.Judge.excess = judging.Judge.excess, excess
+        try:
+            for device in (None, "CUDA"):
+                denoise.gpu = lambda scene, device=device: device
+                _, calls[device] = rendered(scene)
+                for place, threshold in wanted.items():
+                    self.assertGreaterEqual(efforts[-1][place] * threshold**2, 1)
+        finally:
+            judging.Judge.excess, denoise.gpu = known, real
+        self.assertGreaterEqual(len(calls[None]), 2 + 2 * len(wanted))
+        self.assertLess(len(calls["CUDA"]), len(calls[None]))
+
+    def test_how_many_samples_a_share_is_follows_from_all_shares(self):
+        random = numpy.random.default_rng(8)
+        for samples in (16, 100, 640, 5000):
+            for _ in range(20):
+                most = int(random.integers(1, samples // 16 + 1)) * 16 if samples > 100 else samples
+                counts = numpy.minimum(random.integers(1, most // 16 + 2, (9, 7, 1)) * 16, most)
+                counts[0, 0], counts[1, 1] = most, min(16, most)
+                shares = (counts / most).astype(numpy.float32)
+                found = sampling.counts(shares, 15, 0.1, samples)
+                # Of several that fit, the fewest: all of them are in the same ratio
+                self.assertTrue((found * most == counts * found.max()).all() and found.max() <= most, (most, samples))
+
     def test_passes_maps_summary_and_metadata_are_left(self):
         scene = room()
         layer, settings = scene.view_layers[0], scene.render.image_settings

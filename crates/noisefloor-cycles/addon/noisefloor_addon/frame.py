@@ -12,7 +12,7 @@ import bpy
 import noisefloor
 import numpy
 
-from . import judging, passes, sampling
+from . import denoise, judging, passes, sampling
 from .host import rectangles
 
 SAMPLES, NOISE, LOST = "noisefloor Samples", "noisefloor Visible Noise", "noisefloor JOD Lost"
@@ -26,12 +26,20 @@ CELL = 32
 AIM, LEAST_STEP = 0.9, 1.25
 # Fewer samples are not worth a call of Cycles, which looks at its threshold after 16
 FEWEST = 16
+# What a call costs a GPU, however small the part, in samples of each pixel of the frame: 36 and 40 on an H200 (docs/benchmarks/gpu.md)
+START = 32
 
 
 def film_rate(scene):
     """Frames per second, if the noise of an animation is new in every frame; None if it is not, or slower than a film."""
     rate = scene.render.fps / scene.render.fps_base
     return rate if scene.cycles.use_animated_seed and rate >= 10 else None
+
+
+def cells(region):
+    """The cells that a region has pixels of."""
+    x, y, width, height = region
+    return slice(y // CELL, -(-(y + height) // CELL)), slice(x // CELL, -(-(x + width) // CELL))
 
 
 class Frame:
@@ -68,8 +76,11 @@ class Frame:
         self.tuning = noisefloor.Tuning(threshold=(COARSEST, FINEST))
         self.halves = passes.Sums(*self.size), passes.Sums(*self.size)
         # The sum of 1/threshold² of the pictures that each cell has, and how far it is from what may be seen
-        cells = -(-self.size[1] // CELL), -(-self.size[0] // CELL)
-        self.effort, self.ratio = numpy.zeros(cells), numpy.full(cells, numpy.inf)
+        down, across = -(-self.size[1] // CELL), -(-self.size[0] // CELL)
+        self.effort, self.ratio = numpy.zeros((down, across)), numpy.full((down, across), numpy.inf)
+        # Samples of a pixel for each unit of that, on average, in each cell
+        self.rate = numpy.zeros((down, across))
+        self.on_gpu, self.stream = denoise.gpu(self.scene) is not None, ""
         self.excess, self.reason, self.thresholds = None, None, []
         # Samples, over all pixels, and how many of them are expected in the end
         self.begun, self.sampled, self.expected = time.monotonic(), 0, None
@@ -136,10 +147,10 @@ class Frame:
         jobs = self._jobs(each)
         if not jobs:
             return "max-spp"
-        parts = list(rectangles(jobs, ["threshold", "samples"]))
+        parts = self._parts(jobs)
         self.thresholds.append(each)
         for half, sums in enumerate(self.halves):
-            for number, (region, (threshold, samples), _) in enumerate(parts):
+            for number, (region, threshold, samples) in enumerate(parts):
                 left = 0.0
                 if self.settings.time_limit > 0:
                     # A fair share of what is left, for this picture
@@ -147,6 +158,8 @@ class Frame:
                     if left <= 0:
                         return "time-limit"
                     left /= (2 - half) * len(parts) - number
+                # Parts that overlap must not get the same samples
+                self.stream = f" part {number}" if self.on_gpu and number else ""
                 pictures, counts = self._sample(region, half, threshold, samples, left)
                 cancelled = self._cancelled()
                 # The last picture may be incomplete then: better than none
@@ -158,20 +171,19 @@ class Frame:
                 if not bpy.app.background:
                     self._show(region)
                 report(self)
-        for job in jobs:
-            self.effort[job["cell"]] += 1 / job["threshold"] ** 2
+        for region, threshold, _ in parts:
+            self.effort[cells(region)] += 1 / threshold**2
         return self._verdict()
 
     def _jobs(self, each):
         """What is rendered next: cells, each with a threshold and the most samples. With all that it has, the worst is then
         as good as after one picture with the threshold `each`; others get as much less as they are better."""
-        jobs, most = [], self.settings.max_samples // 2
+        jobs = []
         target, first = 1 / each**2, 0.5 / COARSEST**2
         for cell in zip(*numpy.nonzero(self.ratio > 1)):
             y, x = (int(place) * CELL for place in cell)
             width, height = min(CELL, self.size[0] - x), min(CELL, self.size[1] - y)
-            here = slice(y, y + height), slice(x, x + width)
-            samples = most - int(max(half.samples[here].max() for half in self.halves))
+            samples = self._room((x, y, width, height))
             wanted = target
             if self.excess is not None and self.excess.ratio < math.inf:
                 share = math.log(self.ratio[cell] / AIM) / math.log(self.excess.ratio / AIM)
@@ -183,22 +195,71 @@ class Frame:
             if samples >= FEWEST and missing > 0:
                 threshold = float(f"{missing**-0.5:.3g}")
                 jobs.append(
-                    {"x": x, "y": y, "width": width, "height": height, "cell": cell}
+                    {"x": x, "y": y, "width": width, "height": height}
                     | {"threshold": threshold, "samples": samples}
                 )
         return jobs
+
+    def _room(self, region):
+        """How many samples each half of a region may still get."""
+        x, y, width, height = region
+        here = slice(y, y + height), slice(x, x + width)
+        return self.settings.max_samples // 2 - int(max(half.samples[here].max() for half in self.halves))
+
+    def _parts(self, jobs):
+        """What Cycles is called for: regions, each with a threshold and the most samples."""
+        parts = [(region, *values) for region, values, _ in rectangles(jobs, ["threshold", "samples"])]
+        if not self.on_gpu:
+            return parts
+        # A GPU is faster with one region around two, and the finer threshold, than with a call for each
+        joined = []
+        for part in parts:
+            while True:
+                best, saved = None, 0
+                for other in joined:
+                    both = self._around(part, other)
+                    if both[2] >= FEWEST:
+                        saves = self._cost(part) + self._cost(other) - self._cost(both)
+                        best, saved = ((other, both), saves) if saves > saved else (best, saved)
+                if best is None:
+                    break
+                joined.remove(best[0])
+                part = best[1]
+            joined.append(part)
+        return joined
+
+    def _around(self, one, other):
+        """The part around two."""
+        (left, top, width, height), (x, y, across, down) = one[0], other[0]
+        right, bottom = max(left + width, x + across), max(top + height, y + down)
+        left, top = min(left, x), min(top, y)
+        region = left, top, right - left, bottom - top
+        return region, min(one[1], other[1]), self._room(region)
+
+    def _cost(self, part):
+        """What a part takes a GPU, in samples: as many for its threshold as its pixels had for those before."""
+        region, threshold, most = part
+        here = cells(region)
+        least = sampling.least(self.fewest, threshold, most)
+        samples = numpy.clip(self.rate[here] / threshold**2, least, most).sum() * CELL**2
+        return START * self.size[0] * self.size[1] + samples
 
     def _verdict(self):
         """What is wrong where; returns why to end, if so."""
         self.excess = self.judge.excess([half.means() for half in self.halves])
         self.ratio[:] = 0
         for x, y, width, height, ratio in self.excess.squares():
-            cells = slice(y // CELL, -(-(y + height) // CELL)), slice(x // CELL, -(-(x + width) // CELL))
-            self.ratio[cells] = numpy.maximum(self.ratio[cells], ratio)
+            here = cells((x, y, width, height))
+            self.ratio[here] = numpy.maximum(self.ratio[here], ratio)
         if self.excess.ratio <= 1:
             return "found"
         # All samples together are the picture
         self.tuning.tell(self.excess.ratio, alone=self.excess.ratio)
+        if self.on_gpu:
+            known = sum(half.samples for half in self.halves)[..., 0] / 2
+            edges = [numpy.arange(0, side, CELL) for side in known.shape]
+            of_cell = numpy.add.reduceat(numpy.add.reduceat(known, edges[0], 0), edges[1], 1) / CELL**2
+            self.rate = of_cell / numpy.maximum(self.effort, 1)
         # What fails by so much needs the square of that as many samples, as far as it is noise
         spp = sum(half.samples for half in self.halves)[..., 0]
         times = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2, numpy.ones((CELL, CELL)))
@@ -215,7 +276,7 @@ class Frame:
         # For motion blur, Cycles evaluates other frames, and settings that move are as in the file again
         cycles = self.depsgraph.scene_eval.cycles
         digest = hashlib.blake2b(
-            f"{self.seed} half {half} round {len(self.thresholds)}".encode(), digest_size=4
+            f"{self.seed} half {half} round {len(self.thresholds)}{self.stream}".encode(), digest_size=4
         ).digest()
         sampling.adapt(cycles, int.from_bytes(digest, "little") >> 1, threshold, samples)
         cycles.time_limit = seconds

@@ -78,11 +78,17 @@ def counts(shares, fewest, threshold, samples):
 
     first = least(fewest, threshold, samples)
     some = numpy.unique(shares[shares > 0])
-    for most in range(first, samples + 1):
+    # The largest share but 1 is a whole number of steps of the most
+    largest = some[some < 1].max(initial=0)
+    steps = range(16, samples + 1, 16) if largest > 0 else []
+    candidates = [round(step / float(largest)) for step in steps] or range(first, samples + 1)
+    for most in candidates:
+        if not first <= most <= samples:
+            continue
         found = some.astype(numpy.float64) * most
         whole = found.round()
-        steps = (whole % 16 == 0) | (whole == most)
-        if steps.all() and (whole >= first).all() and numpy.abs(found - whole).max(initial=0) < 1e-3:
+        in_steps = (whole % 16 == 0) | (whole == most)
+        if in_steps.all() and (whole >= first).all() and numpy.abs(found - whole).max(initial=0) < 1e-3:
             return (shares * numpy.float32(most)).round()
     # A picture that was stopped
     return numpy.maximum(shares * numpy.float32(first), 1)
