@@ -2,12 +2,12 @@
 """Cycles' noise threshold: defaults, guesses, fixed samples, what Find Noise Threshold finds, and the add-on's own loop,
 for blender.md.
 
-    tune.py render ADDON.zip SCENE(.py|.blend) WIDTHxHEIGHT FOLDER [REFERENCE_SPP [SEEDS]]   in an environment that has bpy
+    tune.py render ADDON.zip SCENE(.py|.blend) WIDTHxHEIGHT FOLDER [REFERENCE_SPP [SEEDS [DEVICE]]]   in an environment that has bpy
     tune.py measure FOLDER...                                                       pip install cvvdp pillow
 
 `render` writes what Blender shows (view transform included) as PNGs of 16 bits, denoised by Cycles' own Open Image
-Denoise, two seeds a setting unless said otherwise, beside times.json with the processor seconds of each render and of the search; it goes on
-where it was interrupted. `measure` says what the worst square of 64 pixels, side by side, has lost against the reference, by the package
+Denoise, two seeds a setting unless said otherwise, beside times.json with the processor seconds of each render and of the search,
+or the wall seconds if DEVICE is OPTIX, CUDA, HIP, ONEAPI or METAL, which then denoises, too; it goes on where it was interrupted. `measure` says what the worst square of 64 pixels, side by side, has lost against the reference, by the package
 `cvvdp`, no code of this project: on average over two seeds, and of the worse one."""
 import json
 import pathlib
@@ -22,7 +22,8 @@ THRESHOLDS = [("threshold", t) for t in (0.2, 0.1, 0.05, 0.03, 0.01)]
 SAMPLES = [("samples", n) for n in (64, 256)]
 
 
-def render(addon, path, size, folder, reference=4096, seeds=2):
+def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
+    reference, seeds = int(reference), int(seeds)
     import bpy
 
     folder = pathlib.Path(folder)
@@ -41,14 +42,26 @@ def render(addon, path, size, folder, reference=4096, seeds=2):
     scene = bpy.context.scene
     cycles, shot, settings = scene.cycles, scene.render, scene.render.image_settings
     cycles.device, cycles.use_denoising, scene.noisefloor.use = "CPU", True, False
+    if device != "CPU":
+        own = bpy.context.preferences.addons["cycles"].preferences
+        own.compute_device_type = device
+        for each in own.get_devices_for_type(device):
+            each.use = each.type == device
+        cycles.device, cycles.denoising_use_gpu = "GPU", True
     shot.resolution_x, shot.resolution_y, shot.resolution_percentage = width, height, 100
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"
     settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "16"
     times = folder / "times.json"
-    done = json.loads(times.read_text()) if times.exists() else {}
+    done = json.loads(times.read_text()) if times.exists() else {"device": device}
+    if device != "CPU":
+        # Kernels and the denoiser wake up
+        cycles.use_adaptive_sampling, cycles.samples = False, 8
+        bpy.ops.render.render()
 
     def used():
+        if device != "CPU":
+            return time.time()
         return resource.getrusage(resource.RUSAGE_SELF).ru_utime
 
     def one(kind, value, seed):
@@ -129,7 +142,7 @@ def measure(folders):
 if __name__ == "__main__":
     if sys.argv[1:2] == ["render"]:
         addon, scene, size, folder, *more = sys.argv[2:]
-        render(addon, scene, size, folder, *map(int, more))
+        render(addon, scene, size, folder, *more)
     elif sys.argv[1:2] == ["measure"]:
         measure(sys.argv[2:])
     else:
