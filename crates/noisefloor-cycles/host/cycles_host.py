@@ -73,7 +73,8 @@ class Cycles:
             "width": self.scene.render.resolution_x,
             "height": self.scene.render.resolution_y,
             "unit": "samples-per-pixel",
-            "repeats": "samples",
+            # A GPU adds the samples of a pixel in any order
+            "repeats": "nothing" if gpu else "samples",
             "warnings": warnings,
         }
 

@@ -17,8 +17,8 @@
 //! trust.
 //!
 //! # Samples
-//! The source repeats samples, however requests are cut. Each `Request::sequence` is a pattern of Cycles' own
-//! Sobol table with its own seed, and another after 8,192 samples: halves are hardly correlated (−0.04 in the
+//! On the processor, the source repeats samples, however requests are cut; on a GPU, nothing. Each
+//! `Request::sequence` is a pattern of Cycles' own Sobol table with its own seed, and another after 8,192 samples: halves are hardly correlated (−0.04 in the
 //! Cornell box), and the batches of one half fill each other's gaps. Cycles renders one rectangle of tiles at a
 //! time, at a cost of 5 ms beside the samples.
 //!
