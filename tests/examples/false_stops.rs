@@ -5,7 +5,7 @@
 
 use noisefloor::{
     Driver, FixedSpp, Oracle, Params, Rgb, Schedule, StopReason, Tile, descriptor::NoiseMask,
-    display::Display,
+    display::Display, evidence::Plane,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
 use std::error::Error;
@@ -29,14 +29,14 @@ fn source(scene: &str, seed: u64) -> Result<Ptwne, Box<dyn Error>> {
 
 /// Deviation of the noise mask of the error of a tile, and the error of its mean, in 8-bit steps.
 fn error(image: &[Rgb], truth: &[Rgb], display: &Display, tile: Tile) -> (f64, f64) {
-    let error = ndarray::Array2::from_shape_fn((tile.height, tile.width), |(y, x)| {
+    let error = Plane::from_fn((tile.height, tile.width), |(y, x)| {
         let pixel = (tile.y + y) * EDGE + tile.x + x;
         255.0 * (display.luma(image[pixel]) - display.luma(truth[pixel]))
     });
     let mask = NoiseMask::default().apply(&error);
-    let count = error.len() as f64;
-    let noise = mask.iter().map(|v| f64::from(v * v)).sum::<f64>() / count;
-    (noise.sqrt(), error.iter().map(|&v| f64::from(v)).sum::<f64>() / count)
+    let count = error.values().len() as f64;
+    let noise = mask.values().iter().map(|v| f64::from(v * v)).sum::<f64>() / count;
+    (noise.sqrt(), error.values().iter().map(|&v| f64::from(v)).sum::<f64>() / count)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

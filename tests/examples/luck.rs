@@ -5,7 +5,7 @@
 
 use noisefloor::{
     Batch, Driver, Oracle, Params, ProgressiveSource, Request, Rgb, Schedule, SourceError, SourceInfo,
-    descriptor::NoiseMask, display::Display,
+    descriptor::NoiseMask, display::Display, evidence::Plane,
 };
 use std::error::Error;
 
@@ -114,12 +114,13 @@ fn stop(source: Rare, params: Params) -> Result<(u64, bool, f64), Box<dyn Error>
     let samples = session.stops().next().ok_or("no stop")?.spp;
     let display: Display = session.display().ok_or("no display")?.clone();
     let (image, edge) = (session.film().image(), source.edge);
-    let error = ndarray::Array2::from_shape_fn((edge, edge), |(y, x)| {
+    let error = Plane::from_fn((edge, edge), |(y, x)| {
         let truth: Rgb = [source.truth(0, x, y); 3];
         display.luma(image[y * 2 * edge + x]) - display.luma(truth)
     });
     let mask = NoiseMask::default().apply(&error);
-    let deviation = f64::from(mask.iter().map(|v| v * v).sum::<f32>() / mask.len() as f32).sqrt();
+    let deviation =
+        f64::from(mask.values().iter().map(|v| v * v).sum::<f32>() / mask.values().len() as f32).sqrt();
     Ok((samples, source.found > 0, 255.0 * deviation))
 }
 

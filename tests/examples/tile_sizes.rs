@@ -2,11 +2,11 @@
 //! 32 and 16 pixels, and prints a Markdown table of samples, agreement with tiles of 128, and seams.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
-use ndarray::Array2;
 use noisefloor::{
     Driver, FixedSpp, Oracle, Params, Rgb, Session, Stop, StoppingCriterion,
     descriptor::NoiseMask,
     display::{Display, luminance},
+    evidence::Plane,
     tile::DEFAULT_TILE,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, scenes};
@@ -96,12 +96,12 @@ fn render<C: StoppingCriterion>(
 }
 
 /// Energy of the noise mask of what two pictures differ by, in display luminance.
-fn noise_energy(image: &[Rgb], converged: &[Rgb], display: &Display) -> Array2<f32> {
+fn noise_energy(image: &[Rgb], converged: &[Rgb], display: &Display) -> Plane {
     let shown = |p: Rgb| luminance(display.encode(p));
-    let noise = Array2::from_shape_fn((EDGE, EDGE), |(y, x)| {
-        shown(image[y * EDGE + x]) - shown(converged[y * EDGE + x])
-    });
-    NoiseMask::default().apply(&noise).mapv_into(|v| v * v)
+    let noise =
+        Plane::from_fn((EDGE, EDGE), |(y, x)| shown(image[y * EDGE + x]) - shown(converged[y * EDGE + x]));
+    let mask = NoiseMask::default().apply(&noise);
+    Plane::from_fn((EDGE, EDGE), |at| mask[at] * mask[at])
 }
 
 /// A pixel at a border between tiles that stopped apart, the one deeper in its tile, and the one beyond the
@@ -133,7 +133,7 @@ fn borders(tile: usize, spp: &[f64]) -> Vec<Edge> {
 
 /// Median noise energy beside the borders over that deeper in the tiles: medians, since a few fireflies would
 /// decide means.
-fn beside(edges: &[Edge], energy: &Array2<f32>) -> f64 {
+fn beside(edges: &[Edge], energy: &Plane) -> f64 {
     let median = |place: fn(&Edge) -> usize| -> f64 {
         let mut energies: Vec<f32> =
             edges.iter().map(|e| energy[(place(e) / EDGE, place(e) % EDGE)]).collect();

@@ -367,11 +367,8 @@ pub fn spp_with_denoising(
 /// The noise of a tile of the film, as displayed, on what is shown there, or on itself.
 fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Option<Vec<f32>>) -> DenoisedError {
     let planes = TilePlanes::from_halves(film, display, tile);
-    let inner = planes.inner;
-    let rows =
-        (inner.y..inner.y + inner.height).flat_map(|y| (inner.x..inner.x + inner.width).map(move |x| (y, x)));
-    let shown = shown.unwrap_or_else(|| rows.clone().map(|at| planes.image[at]).collect());
-    let noise = rows.map(|at| planes.residual[at]).collect();
+    let shown = shown.unwrap_or_else(|| planes.image.inside(planes.inner).collect());
+    let noise = planes.residual.inside(planes.inner).collect();
     DenoisedError::of((tile.width, tile.height), shown, noise, display)
 }
 

@@ -6,8 +6,9 @@
 
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
-use ndarray::Array2;
-use noisefloor::{ProgressiveSource, Request, Rgb, Tile, TileGrid, ToneMapping, descriptor::NoiseMask};
+use noisefloor::{
+    ProgressiveSource, Request, Rgb, Tile, TileGrid, ToneMapping, descriptor::NoiseMask, evidence::Plane,
+};
 use noisefloor_ptwne::{Ptwne, RenderOptions, Scene, scenes};
 use std::error::Error;
 use std::path::Path;
@@ -76,7 +77,7 @@ fn deviations(references: &[Vec<Rgb>], picture: &[Rgb], size: usize) -> Result<[
         let luma = |image: usize| display.luma(references[image][y * size + x]);
         (luma(0) - luma(1)) * std::f32::consts::FRAC_1_SQRT_2 * 255.0
     };
-    let mask = NoiseMask::default().apply(&Array2::from_shape_fn((size, size), |(y, x)| error(y, x)));
+    let mask = NoiseMask::default().apply(&Plane::from_fn((size, size), |(y, x)| error(y, x)));
     let tiles: Vec<f64> = TileGrid::new(size, size, 128)?
         .tiles()
         .map(|t| {

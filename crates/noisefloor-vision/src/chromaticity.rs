@@ -1,5 +1,6 @@
 //! The colours of a display: chromaticities of its primaries and its white → linear RGB to CIE XYZ.
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -14,7 +15,8 @@ use thiserror::Error;
 /// assert_eq!(params.check()?, "desk,white=d50".parse()?);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Chromaticities {
     /// Of red.
     pub red: [f64; 2],

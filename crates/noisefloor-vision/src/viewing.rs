@@ -1,14 +1,17 @@
 //! What a picture is seen on, and from where: the display's light and its pixels per degree.
 
 use crate::chromaticity::{Chromaticities, ChromaticityError};
+#[cfg(feature = "serde")]
 use serde::ser::SerializeStruct;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize, Serializer};
 use std::f64::consts::PI;
 use thiserror::Error;
 
 /// How code values become light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Eotf {
     /// IEC 61966-2-1; code values in [0, 1].
     #[default]
@@ -27,8 +30,9 @@ pub enum Eotf {
 /// as they are, and eyes are taken as adapted to D65, as in ColorVideoVDP: with another white, greys have a
 /// colour.
 // Model files number the variants: new ones come last
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Primaries {
     /// ITU-R BT.709, those of sRGB; white is D65.
     #[default]
@@ -61,7 +65,8 @@ impl From<Chromaticities> for Primaries {
 }
 
 /// Unchecked viewing conditions. [`ViewingParams::check`] makes them a [`Viewing`].
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Deserialize))]
 pub struct ViewingParams {
     /// Pixels per degree of visual angle in the centre of the picture, within 1…2000.
     pub pixels_per_degree: f64,
@@ -78,10 +83,11 @@ pub struct ViewingParams {
     /// Their primaries and white.
     pub primaries: Primaries,
     /// In a film whose noise is new in every frame, its frames per second; `None` for a still.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub frames_per_second: Option<f64>,
 }
 
+#[cfg(feature = "serde")]
 impl Serialize for ViewingParams {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         // Where fields have names, a still says nothing of films: digests of what was written before stay as they are
@@ -191,8 +197,9 @@ impl ViewingParams {
 ///
 /// As text, they are a preset (`desk`, `standard_4k`), numbers (`ppd=60,peak=300,black=0.3,ambient=100`), or
 /// a preset with changes (`desk,distance=1.2`, `desk,primaries=p3,white=d50`, `desk,fps=24`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "ViewingParams", into = "ViewingParams")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "ViewingParams", into = "ViewingParams"))]
 pub struct Viewing(ViewingParams);
 
 impl TryFrom<ViewingParams> for Viewing {

@@ -281,15 +281,19 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// # Errors
     /// [`SessionError::Background`] if the criterion panicked.
     pub fn into_session(self) -> Result<Session<C>, SessionError> {
-        self.take_session()
+        self.take()
     }
 
     /// As [`Background::into_session`], once: for handles of other languages, which others may hold.
     ///
     /// # Errors
     /// As of [`Background::into_session`], and the second time.
-    #[doc(hidden)]
+    #[cfg(feature = "internals")]
     pub fn take_session(&self) -> Result<Session<C>, SessionError> {
+        self.take()
+    }
+
+    fn take(&self) -> Result<Session<C>, SessionError> {
         drop(self.finish());
         self.end();
         let mut judged = self.shared.judged.lock().map_err(|_| self.shared.failure())?;

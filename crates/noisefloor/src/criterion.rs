@@ -8,6 +8,7 @@ use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use auto_impl::auto_impl;
 use noisefloor_vision::Viewing;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -61,7 +62,8 @@ impl Needs {
 
 /// Where people are expected to stop seeing noise in a tile: not where the tile stops, which is later, and
 /// said by [`Verdict::expected_spp`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct ExpectedThreshold {
     /// Samples per pixel below which it lies with a probability of 10 %.
     pub low: u64,
@@ -72,7 +74,8 @@ pub struct ExpectedThreshold {
 }
 
 /// What a criterion says about one tile.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub struct Verdict {
     /// Whether the tile needs no more samples.

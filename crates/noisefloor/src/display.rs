@@ -3,6 +3,7 @@
 use crate::rgb::Rgb;
 use exposure::{LogAverage, NoisyPixel};
 use multiversion::multiversion;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -19,8 +20,7 @@ pub use tone_curve::ToneCurve;
 pub use tone_table::{ToneTable, ToneTableError};
 
 /// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
-#[doc(hidden)]
-pub const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
+pub(crate) const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
 
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
 pub const DEFAULT_KEY: f32 = 0.18;
@@ -41,8 +41,9 @@ pub fn luminance([r, g, b]: Rgb) -> f32 {
 }
 
 /// How a picture is to be displayed, before its exposure is known.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 pub enum ToneMapping {
     /// The photographic operator, global form (Reinhard et al. 2002, eqs. 1–4).
     Reinhard {
@@ -196,7 +197,8 @@ fn log_average(pixels: &[Rgb]) -> Option<f64> {
     geometric_mean(DELTA * geometric_mean(0.0)?)
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 enum Curve {
     Clamp,
     Reinhard { white: Option<f32> },
@@ -225,7 +227,8 @@ impl Curve {
 /// let shown = display.luma([0.5; 3]);
 /// assert!((shown - 0.427).abs() < 1e-3, "{shown}");
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Display {
     exposure: f32,
     curve: Curve,

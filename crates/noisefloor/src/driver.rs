@@ -2,6 +2,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "a driver keeps a limit of time, and says where time went")]
 
+#[cfg(feature = "files")]
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::criterion::{CriterionError, StoppingCriterion};
 use crate::film::FilmError;
@@ -9,8 +10,11 @@ use crate::params::Params;
 use crate::session::rounds::CALL_SAMPLES;
 use crate::session::{Interruption, Stop};
 use crate::session::{Session, SessionError};
-use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError};
+#[cfg(feature = "files")]
+use crate::source::Repeats;
+use crate::source::{Batch, ProgressiveSource, Request, SourceError};
 use crate::watch::Fault;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
@@ -57,7 +61,8 @@ impl From<SessionError> for DriverError {
 }
 
 /// One point of a run's history.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct TimelinePoint {
     /// Seconds that the driver has run.
     pub seconds: f64,
@@ -93,7 +98,8 @@ pub struct Progress {
 }
 
 /// How the time of all runs of a driver was spent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Clock {
     /// Seconds in the source, including its reference.
     pub source_seconds: f64,
@@ -374,6 +380,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     /// [`CheckpointError`] as in [`Session::resume`], and [`CheckpointError::Source`] if the source does not
     /// promise to repeat its samples ([`Repeats::Samples`]): it could return samples that the film already
     /// has.
+    #[cfg(feature = "files")]
     pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
         let info = self.source.info();
         if info.repeats != Repeats::Samples {

@@ -2,21 +2,22 @@
 
 use crate::display::{Display, luma_row, luminance};
 use crate::film::{Film, blend_row, weights};
+pub use crate::plane::Plane;
 use crate::rgb::Rgb;
 use crate::tile::Tile;
-use ndarray::{Array2, s};
 use noisefloor_vision::Viewing;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::Range;
 
 /// How far filters read beyond a tile, in pixels, and the edge of the blocks that a tile is divided into.
-#[doc(hidden)]
 pub const HALO: usize = 8;
 
 /// What a noisy tile is compared with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 pub enum Evidence {
     /// The other half buffer: no reference is needed.
     Halves,
@@ -72,10 +73,10 @@ thread_local! {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TilePlanes {
     /// Luminance Y′ of the middle between the two pictures, in [0, 1].
-    pub image: Array2<f32>,
+    pub image: Plane,
     /// Residual of the luminance Y′: the difference of the two pictures, scaled so that its standard deviation is that
     /// of the noise that is judged.
-    pub residual: Array2<f32>,
+    pub residual: Plane,
     /// Variance of known white rounding noise in each of the residuals of R′, G′ and B′; 0 for pictures in
     /// floating point.
     pub rounding: f32,
@@ -108,14 +109,12 @@ impl TilePlanes {
     /// 0 without noise. An energy of noise that is estimated from one residual for each pixel has a relative
     /// variance of about 1/(share·N).
     pub(crate) fn noise_spread(&self) -> f32 {
-        let Tile { x, y, width, height, .. } = self.inner;
-        let residuals = self.residual.slice(s![y..y + height, x..x + width]);
         let (mut squares, mut fourths) = (0.0f64, 0.0f64);
-        for &r in residuals {
+        for r in self.residual.inside(self.inner) {
             let square = f64::from(r) * f64::from(r);
             (squares, fourths) = (squares + square, fourths + square * square);
         }
-        if fourths > 0.0 { (squares * squares / (fourths * residuals.len() as f64)) as f32 } else { 0.0 }
+        if fourths > 0.0 { (squares * squares / (fourths * self.inner.pixels() as f64)) as f32 } else { 0.0 }
     }
 
     /// As [`TilePlanes::gather`] of `N` linear pictures. `read(y, columns, pictures, numbers)` reads the pixels of them in
@@ -165,15 +164,14 @@ impl TilePlanes {
             row(mirror(tile.y + place, height), &columns, &mut scratch, image, residual);
         }
         BUFFERS.set(Buffers { planes: Default::default(), columns, scratch });
-        let [image, residual] =
-            [image, residual].map(|values| Array2::from_shape_vec(shape, values).expect("one value a pixel"));
+        let [image, residual] = [image, residual].map(|values| Plane::new(shape, values));
         let inner = Tile { x: HALO, y: HALO, ..tile };
         Self { image, residual, rounding: 0.0, viewing: Viewing::default(), inner, place: tile }
     }
 
     /// Returns its memory to this thread's buffers, so that the next verdict does not allocate.
     pub(crate) fn recycle(self) {
-        let planes = [self.image, self.residual].map(|plane| plane.into_raw_vec_and_offset().0);
+        let planes = [self.image, self.residual].map(Plane::into_values);
         BUFFERS.with_borrow_mut(|buffers| buffers.planes = planes);
     }
 
@@ -374,9 +372,12 @@ mod tests {
                 film.add(0, n, &batch).unwrap();
             }
             let planes = TilePlanes::from_halves(&film, &Display::SRGB, grid.tile(0));
-            let mean = planes.image.mean().unwrap();
-            let spread = planes.image.mapv(|v| (v - mean).powi(2)).mean().unwrap();
-            let residual = planes.residual.mapv(|v| v * v).mean().unwrap();
+            let mean_of = |values: &Plane, of: &dyn Fn(f32) -> f32| {
+                values.values().iter().map(|&v| f64::from(of(v))).sum::<f64>() / values.values().len() as f64
+            };
+            let mean = mean_of(&planes.image, &|v| v) as f32;
+            let spread = mean_of(&planes.image, &|v| (v - mean).powi(2));
+            let residual = mean_of(&planes.residual, &|v| v * v);
             // Each variance estimate over 4096 pixels errs by √(2/4096) = 2.2 %; 13 % is 4 σ of their ratio:
             // 1 in 16,000.
             assert!((residual / spread - 1.0).abs() < 0.13, "{batches:?}: {residual} against {spread}");
@@ -436,7 +437,7 @@ mod tests {
         let by_pair =
             TilePlanes::from_pair((32, 32), grid.tile(0), &Display::SRGB, pair, Samples::Independent)
                 .unwrap();
-        for (f, p) in by_film.residual.iter().zip(&by_pair.residual) {
+        for (f, p) in by_film.residual.values().iter().zip(by_pair.residual.values()) {
             // The bend of the display within the noise, of 3.5 % where it is strongest, counts for 3·10⁻⁴ of it
             assert!((f * (400.0f32 / 300.0).sqrt() - p).abs() < 1e-6 + 1e-3 * p.abs());
         }
@@ -445,7 +446,8 @@ mod tests {
         let [one, other] = [both, [both[1], both[0]]]
             .map(|both| TilePlanes::from_both((32, 32), grid.tile(0), &Display::SRGB, both));
         assert_eq!((&one.image, &one.residual), (&by_film.image, &by_film.residual));
-        assert_eq!((&one.image, one.residual), (&other.image, -other.residual));
+        assert_eq!(one.image, other.image);
+        assert!(one.residual.values().iter().zip(other.residual.values()).all(|(one, other)| *one == -other));
         assert!((one.rounding - 0.02 * 0.75 * 0.25).abs() < 1e-6);
     }
 
@@ -456,14 +458,14 @@ mod tests {
             |i: usize| TilePlanes::gather((112, 48), grid.tile(i), |x, y| ([x as f32; 3], [y as f32; 3]));
         let close = |a: f32, b: f32| (a - b).abs() < 1e-4;
         let first = plane(0);
-        assert_eq!(first.image.dim(), (48, 48));
+        assert_eq!(first.image.size(), (48, 48));
         assert!(
             close(first.image[(8, 8)], 0.0)
                 && close(first.image[(8, 7)], 1.0)
                 && close(first.image[(8, 40)], 32.0)
         );
         let last = plane(7); // rows 32…47, columns 96…111
-        assert_eq!((last.image.dim(), last.inner.width), ((32, 32), 16));
+        assert_eq!((last.image.size(), last.inner.width), ((32, 32), 16));
         assert!(close(last.image[(8, 8)], 96.0) && close(last.residual[(8, 8)], 32.0));
         assert!(
             close(last.image[(8, 24)], 110.0) && close(last.residual[(24, 8)], 46.0),

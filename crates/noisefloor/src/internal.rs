@@ -1,15 +1,24 @@
-//! What other crates of this workspace share with this one; no part of its public interface, and without
-//! promises.
+//! What other crates of this workspace share with this one.
 
+use crate::tile::TileError;
 use std::borrow::Cow;
 use std::path::Path;
 
 pub use crate::container::{FileFault, Format};
-pub use crate::display::ROUNDING_LUMINANCE;
 pub use crate::evidence::{HALO, held};
 pub use crate::model::familiarity::nearest;
 pub use crate::text::{lines, stand_in, text};
-pub use crate::tile::check_image;
+
+/// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
+pub const ROUNDING_LUMINANCE: f32 = crate::display::ROUNDING_LUMINANCE;
+
+/// Checks an image's size against the limits, before anything of that size is allocated.
+///
+/// # Errors
+/// [`TileError::Image`] if it is empty or too large.
+pub fn check_image(width: usize, height: usize) -> Result<(), TileError> {
+    crate::tile::check_image(width, height)
+}
 
 /// Makes text from a file or another program safe to print on a terminal.
 ///

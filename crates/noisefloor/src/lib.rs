@@ -7,14 +7,25 @@
 //! - A renderer that owns its loop pushes samples into a [`Session`].
 //! - A renderer behind [`ProgressiveSource`] is driven by a [`Driver`].
 //! - A GPU hands over its passes to a [`Background`](background::Background), and goes on.
-//! - A [`Checkpoint`] is a snapshot of either, for resuming it in another process.
+//! - A [`checkpoint`] is a snapshot of either, for resuming it in another process.
 //! - [`Oracle`] is the [`StoppingCriterion`] that judges by a trained [`Model`]; [`FixedSpp`] is the simplest
 //!   one.
 //!
-//! What these three need is at the top; the rest is in modules by subject, which lead from samples to a
-//! verdict: [`source`], [`film`], [`display`], [`evidence`], [`descriptor`], [`svm`], [`model`] and
-//! [`oracle`]. [`stills`] judges pictures rendered elsewhere, and [`tune`] finds the setting of a renderer at which
-//! nobody sees noise.
+//! What these need is at the top; the rest is in modules by subject. [`stills`] judges pictures rendered elsewhere, and
+//! [`tune`] finds the setting of a renderer at which nobody sees noise.
+//!
+//! # Features
+//! - `bundled-model` (on by default): the trained model inside the library.
+//! - `files` (on by default): model files, checkpoints, and serde's traits on what they hold. Without it,
+//!   the library needs neither serde nor bincode nor BLAKE3.
+//!
+//! Two more, `internals` and `train`, serve the crates that train models; any release may change what they open.
+//!
+//! # Threads
+//! [`Session::judge`] and [`Session::push_image`] use all threads of the rayon pool that they are called in: the global one,
+//! or your own by `pool.install(|| session.judge())`. Results do not depend on their number. A verdict on a tile of 128×128
+//! pixels takes 0.4 ms of one processor (`docs/benchmarks/oracle.md` of the project); a
+//! [`Background`](background::Background) session judges in a thread of its own.
 //!
 //! ```
 //! use noisefloor::{Counts, Oracle, Params, Session, StopReason};
@@ -33,25 +44,40 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
+// What only files, training and tests use stands beside what it belongs to
+#![cfg_attr(not(feature = "internals"), allow(dead_code, unreachable_pub, unused_imports))]
+
 pub mod background;
+#[cfg(feature = "files")]
 pub mod checkpoint;
+#[cfg(feature = "files")]
 mod container;
 pub mod criterion;
+#[cfg(not(feature = "internals"))]
+mod descriptor;
+#[cfg(feature = "internals")]
 pub mod descriptor;
 pub mod display;
 pub mod driver;
+#[cfg(not(feature = "internals"))]
+mod evidence;
+#[cfg(feature = "internals")]
 pub mod evidence;
 pub mod film;
-#[doc(hidden)]
+#[cfg(feature = "internals")]
 pub mod internal;
 pub mod model;
 mod nested;
 pub mod oracle;
 pub mod params;
+mod plane;
 mod rgb;
 pub mod session;
 pub mod source;
 pub mod stills;
+#[cfg(not(feature = "internals"))]
+mod svm;
+#[cfg(feature = "internals")]
 pub mod svm;
 mod text;
 pub mod tile;
@@ -68,6 +94,7 @@ pub mod viewing {
 }
 
 // For `Session`
+#[cfg(feature = "files")]
 pub use checkpoint::Checkpoint;
 pub use criterion::{FixedSpp, StoppingCriterion, Verdict};
 pub use display::ToneMapping;
@@ -85,6 +112,3 @@ pub use driver::{Driver, DriverError, Event};
 
 // For `ProgressiveSource`
 pub use source::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};
-
-/// Planes, maps and training rows are its arrays.
-pub use ndarray;

@@ -2,8 +2,8 @@
 
 use crate::descriptor::NoiseMask;
 use crate::display::{Display, ROUNDING_LUMINANCE, luminance};
-use crate::evidence::{Rendering, Samples};
-use ndarray::Array2;
+use crate::evidence::{Plane, Rendering, Samples};
+use crate::tile::Tile;
 
 /// Edge of the blocks that count as independent observations, in pixels: wider than any pixel filter.
 const BLOCK: usize = 16;
@@ -32,7 +32,7 @@ pub(crate) fn shared_samples(
 ) -> Option<Samples> {
     let (fewer, more) = if one.spp <= other.spp { (one, other) } else { (other, one) };
     let independent_slope = -fewer.spp / (fewer.spp + more.spp);
-    let (x, y) = (masked(size, fewer, display)?, masked(size, more, display)?);
+    let (x, y) = (masked(size, fewer, display), masked(size, more, display));
     let rounding = NoiseMask::default().white_noise_gain() * ROUNDING_LUMINANCE;
     let known = [fewer.rounding, more.rounding].map(|variance| f64::from(rounding * variance));
     let blocks = blocks(&x, &y, known);
@@ -63,14 +63,15 @@ struct Block {
     weight: f64,
 }
 
-fn blocks(x: &Array2<f32>, y: &Array2<f32>, [of_x, of_y]: [f64; 2]) -> Vec<Block> {
-    let (rows, columns) = x.dim();
+fn blocks(x: &Plane, y: &Plane, [of_x, of_y]: [f64; 2]) -> Vec<Block> {
+    let (rows, columns) = x.size();
     let mut blocks = Vec::new();
     for top in (0..rows).step_by(BLOCK) {
         for left in (0..columns).step_by(BLOCK) {
-            let here = ndarray::s![top..(top + BLOCK).min(rows), left..(left + BLOCK).min(columns)];
+            let (height, width) = (BLOCK.min(rows - top), BLOCK.min(columns - left));
+            let here = Tile { index: 0, x: left, y: top, width, height };
             let (mut covariance, mut variance, mut energy, mut pixels) = (0.0, 0.0, 0.0, 0.0);
-            for (&x, &y) in x.slice(here).iter().zip(y.slice(here)) {
+            for (x, y) in x.inside(here).zip(y.inside(here)) {
                 let (difference, y) = (f64::from(x) - f64::from(y), f64::from(y));
                 covariance += difference * y;
                 variance += difference * difference;
@@ -89,10 +90,9 @@ fn blocks(x: &Array2<f32>, y: &Array2<f32>, [of_x, of_y]: [f64; 2]) -> Vec<Block
 }
 
 /// Masked luminance as displayed.
-fn masked((width, height): (usize, usize), picture: Rendering<'_>, display: &Display) -> Option<Array2<f32>> {
+fn masked((width, height): (usize, usize), picture: Rendering<'_>, display: &Display) -> Plane {
     let encoded = picture.pixels.iter().map(|&p| luminance(display.encode(p))).collect();
-    let plane = Array2::from_shape_vec((height, width), encoded).ok()?;
-    Some(NoiseMask::default().apply(&plane))
+    NoiseMask::default().apply(&Plane::new((height, width), encoded))
 }
 
 #[cfg(test)]

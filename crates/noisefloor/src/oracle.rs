@@ -1,5 +1,6 @@
 //! The oracle: a trained model as a stopping criterion.
 
+#[cfg(feature = "files")]
 use crate::container;
 use crate::criterion::{CriterionError, ExpectedThreshold, Needs, StoppingCriterion, Verdict, View};
 use crate::descriptor::{Described, DescriptorError};
@@ -10,10 +11,15 @@ use crate::tile::{Tile, TileGrid};
 use crate::unmet::{MetOnce, Unmet};
 use noisefloor_vision::Viewing;
 use rayon::prelude::*;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
 mod people;
-pub use people::{People, PeopleError, Spread};
+#[cfg(not(feature = "internals"))]
+pub(crate) use people::Spread;
+#[cfg(feature = "internals")]
+pub use people::Spread;
+pub use people::{People, PeopleError};
 
 /// A tile with more than one in this many pixels without valid samples gives no evidence, and is not called
 /// converged.
@@ -58,7 +64,8 @@ pub struct Oracle {
 }
 
 /// A tile as it was when last described.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 struct LastDescribed {
     tile: Described,
     /// Share of its pixels that carry its noise.
@@ -105,38 +112,18 @@ impl Oracle {
         self.people
     }
 
-    /// Describes one tile of a picture by its planes, which have `spp` samples per pixel, above 0.
-    /// [`Oracle::judge_described`] wants all tiles of the picture.
-    ///
-    /// # Errors
-    /// [`CriterionError::TileSize`] if the model is for tiles of another size, [`CriterionError::Viewing`] if
-    /// it is for other viewing conditions.
-    pub fn describe(&self, planes: &TilePlanes, spp: f64) -> Result<Described, CriterionError> {
+    pub(crate) fn describe_tile(&self, planes: &TilePlanes, spp: f64) -> Result<Described, CriterionError> {
         let (trained, asked) = (self.model.viewing(), planes.viewing);
-        if asked != trained && !self.model.descriptor().knows_viewing() {
+        if asked != trained && !self.model.parts().descriptor.knows_viewing() {
             let (trained, asked) = (trained.to_string(), asked.to_string());
             return Err(CriterionError::Viewing { name: self.name(), trained, asked });
         }
-        self.model.descriptor().describe_tile(planes, spp).map_err(|e| self.misfit(e))
+        self.model.parts().descriptor.describe_tile(planes, spp).map_err(|e| self.misfit(e))
     }
 
-    /// Judges the tiles that make up a picture, or as many as there are of it: people see a tile in its
-    /// picture, and so does the model. One verdict a tile.
-    pub fn judge_described(&self, tiles: &[Described]) -> Vec<Verdict> {
-        let numbers = self.model.descriptor().in_picture(tiles);
+    pub(crate) fn judge_all(&self, tiles: &[Described]) -> Vec<Verdict> {
+        let numbers = self.model.parts().descriptor.in_picture(tiles);
         tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict(&raw, tile.spp.round() as u64)).collect()
-    }
-
-    /// Judges tiles as [`Oracle::judge_described`] does, for other eyes than those of the training data: P is
-    /// the share of *them*, who see of n samples what trained observers see of [`Audience::seen_as`] n.
-    /// `None` if that cannot be told, since the descriptor does not tell noise from picture, and the audience
-    /// is not [`Audience::TRAINED`].
-    pub fn judge_described_for(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
-        if audience == Audience::TRAINED {
-            return Some(self.judge_described(tiles));
-        }
-        let numbers = self.model.descriptor().in_picture(tiles);
-        tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict_for(raw, tile.spp, audience)).collect()
     }
 
     fn verdict_for(&self, mut raw: Vec<f32>, spp: f64, audience: Audience) -> Option<Verdict> {
@@ -144,7 +131,7 @@ impl Oracle {
         // For someone who is never satisfied with so few samples, the need of the trained audience is sought
         // from one sample on.
         let from = seen_as.max(spp.min(1.0));
-        if !self.model.descriptor().project(&mut raw, (from / spp) as f32) {
+        if !self.model.parts().descriptor.project(&mut raw, (from / spp) as f32) {
             return None;
         }
         let trained = self.verdict(&raw, from.round().max(1.0) as u64);
@@ -175,7 +162,7 @@ impl Oracle {
 
     /// A verdict by a whole, raw descriptor.
     fn verdict(&self, raw: &[f32], spp: u64) -> Verdict {
-        let mut curve = self.model.curve(raw, self.scatter);
+        let mut curve = self.model.parts().curve(raw, self.scatter);
         let judgement = curve.judgement();
         let converged = self.people.are_satisfied_by(judgement.probability);
         Verdict {
@@ -196,34 +183,31 @@ impl Oracle {
         }
     }
 
-    /// Whether [`Oracle::map_visible_noise`] can tell noise from picture.
+    /// Whether the model tells noise from picture, so that [`Session::visible_noise`](crate::Session::visible_noise) and
+    /// [`tune`](crate::tune) can say how visible noise is.
     pub fn maps_visible_noise(&self) -> bool {
-        self.model.descriptor().visible_noise(&[]).is_some()
+        self.model.parts().descriptor.visible_noise(&[]).is_some()
     }
 
-    /// The visible noise of a whole image, row-major, from its tiles as described; NaN where there is none of them.
-    /// 1 is the amplitude at which [`Oracle::people`] of that audience see none: a tile that these
-    /// numbers call converged is nowhere above 1, and one
-    /// that is not is above 1 somewhere. `None` if the descriptor does not tell noise from picture.
-    pub fn map_visible_noise(
+    pub(crate) fn map_noise(
         &self,
         grid: TileGrid,
         tiles: &[Described],
         audience: Audience,
     ) -> Option<Vec<f32>> {
-        let maps = self.model.descriptor().visible_noise(tiles)?;
-        let numbers = self.model.descriptor().in_picture(tiles);
+        let maps = self.model.parts().descriptor.visible_noise(tiles)?;
+        let numbers = self.model.parts().descriptor.in_picture(tiles);
         let mut image = vec![f32::NAN; grid.width() * grid.height()];
         for ((tile, map), raw) in tiles.iter().zip(&maps).zip(&numbers) {
-            let mut curve = self.model.curve(raw, self.scatter);
+            let mut curve = self.model.parts().curve(raw, self.scatter);
             // Noise as strong as in the worst window needs this many times the samples
             let needed = self.crossing(|factor| curve.at(factor)).map_or(f32::INFINITY, |trained| {
                 let wanted = audience.needed(f64::from(trained) * tile.spp) / tile.spp;
                 wanted as f32
             });
-            let worst = map.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+            let worst = map.values().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
             let pixels = tile.place.rows(grid.width()).flatten();
-            pixels.zip(map).for_each(|(pixel, &value)| image[pixel] = value / worst * needed.sqrt());
+            pixels.zip(map.values()).for_each(|(pixel, &value)| image[pixel] = value / worst * needed.sqrt());
         }
         Some(image)
     }
@@ -264,7 +248,7 @@ impl Oracle {
     /// What a tile is like now; `None` if too many of its pixels have no evidence.
     fn look_at(&self, view: &View<'_>, tile: Tile) -> Result<Option<LastDescribed>, CriterionError> {
         let Some(planes) = self.planes(view, tile)? else { return Ok(None) };
-        let described = self.describe(&planes, view.film.spp(tile.index) as f64);
+        let described = self.describe_tile(&planes, view.film.spp(tile.index) as f64);
         let spread = planes.noise_spread();
         planes.recycle();
         let met_once = MetOnce::of(view.film, view.display, tile);
@@ -321,7 +305,7 @@ impl Oracle {
         tiles: &[Tile],
     ) -> Vec<Verdict> {
         let seen: Vec<Described> = described.iter().flatten().cloned().collect();
-        let mut judged = self.model.descriptor().in_picture(&seen).into_iter();
+        let mut judged = self.model.parts().descriptor.in_picture(&seen).into_iter();
         let numbers: Vec<Option<Vec<f32>>> =
             described.iter().map(|d| d.as_ref().and_then(|_| judged.next())).collect();
         let (width, height) = view.film.grid().size();
@@ -368,12 +352,13 @@ impl Oracle {
         let Some(mut planes) = self.planes(view, tile)? else { return Ok(None) };
         // Either sign of the difference of the halves is as good, and light has one: that which does not hang on which
         // half is which
-        let sum: f64 = planes.residual.iter().map(|&r| f64::from(r)).sum();
+        let sum: f64 = planes.residual.values().iter().map(|&r| f64::from(r)).sum();
         if sum < 0.0 {
-            planes.residual.mapv_inplace(|r| -r);
+            planes.residual.values_mut().iter_mut().for_each(|r| *r = -*r);
         }
-        planes.residual += &shown;
-        let described = self.describe(&planes, view.film.spp(tile.index) as f64).map(Some);
+        let residual = planes.residual.values_mut().iter_mut();
+        residual.zip(shown.values()).for_each(|(r, light)| *r += light);
+        let described = self.describe_tile(&planes, view.film.spp(tile.index) as f64).map(Some);
         planes.recycle();
         described
     }
@@ -385,6 +370,51 @@ impl Oracle {
             }
             other => CriterionError::Descriptor(other),
         }
+    }
+}
+
+/// What describes tiles one by one, for whoever has the parts that verdicts are made of.
+#[cfg(feature = "internals")]
+impl Oracle {
+    /// Describes one tile of a picture by its planes, which have `spp` samples per pixel, above 0.
+    /// [`Oracle::judge_described`] wants all tiles of the picture.
+    ///
+    /// # Errors
+    /// [`CriterionError::TileSize`] if the model is for tiles of another size, [`CriterionError::Viewing`] if
+    /// it is for other viewing conditions.
+    pub fn describe(&self, planes: &TilePlanes, spp: f64) -> Result<Described, CriterionError> {
+        self.describe_tile(planes, spp)
+    }
+
+    /// Judges the tiles that make up a picture, or as many as there are of it: people see a tile in its
+    /// picture, and so does the model. One verdict a tile.
+    pub fn judge_described(&self, tiles: &[Described]) -> Vec<Verdict> {
+        self.judge_all(tiles)
+    }
+
+    /// Judges tiles as [`Oracle::judge_described`] does, for other eyes than those of the training data: P is
+    /// the share of *them*, who see of n samples what trained observers see of [`Audience::seen_as`] n.
+    /// `None` if that cannot be told, since the descriptor does not tell noise from picture, and the audience
+    /// is not [`Audience::TRAINED`].
+    pub fn judge_described_for(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
+        if audience == Audience::TRAINED {
+            return Some(self.judge_described(tiles));
+        }
+        let numbers = self.model.parts().descriptor.in_picture(tiles);
+        tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict_for(raw, tile.spp, audience)).collect()
+    }
+
+    /// The visible noise of a whole image, row-major, from its tiles as described; NaN where there is none of them.
+    /// 1 is the amplitude at which [`Oracle::people`] of that audience see none: a tile that these
+    /// numbers call converged is nowhere above 1, and one
+    /// that is not is above 1 somewhere. `None` if the descriptor does not tell noise from picture.
+    pub fn map_visible_noise(
+        &self,
+        grid: TileGrid,
+        tiles: &[Described],
+        audience: Audience,
+    ) -> Option<Vec<f32>> {
+        self.map_noise(grid, tiles, audience)
     }
 }
 
@@ -413,12 +443,16 @@ fn expected_threshold(curve: &mut ProbabilityCurve<'_>, spp: u64) -> Option<Expe
 
 impl StoppingCriterion for Oracle {
     fn name(&self) -> String {
-        format!("{} oracle ({})", self.model.classifier().machine.name(), self.model.descriptor().name())
+        format!(
+            "{} oracle ({})",
+            self.model.parts().classifier.machine.name(),
+            self.model.parts().descriptor.name()
+        )
     }
 
     fn fingerprint(&self) -> String {
         let scatter = self.scatter.map(|s| format!(", measured within {s}")).unwrap_or_default();
-        format!("model {}, {} of people{scatter}, unmet light 1", self.model.digest(), self.people)
+        format!("model {}, {} of people{scatter}, unmet light 1", self.model.fingerprint(), self.people)
     }
 
     fn begin(&mut self, grid: TileGrid) {
@@ -437,9 +471,9 @@ impl StoppingCriterion for Oracle {
         self.model.audience()
     }
 
-    /// See [`Spread::share_in_picture`]; `None` if the model knows nothing of how thresholds scatter.
+    /// From how thresholds scatter between scenes and people; `None` if the model knows nothing of how thresholds scatter.
     fn share_in_picture(&self, viewing: Viewing, tiles: &[(f32, usize)]) -> Option<f64> {
-        let spread = self.model.spread()?;
+        let spread = self.model.parts().spread?;
         let spread = Spread { people: self.scatter.unwrap_or(spread.people), ..spread };
         let places =
             |&(share, pixels): &(f32, usize)| (share, Spread::places(pixels, viewing.pixels_per_degree()));
@@ -453,7 +487,7 @@ impl StoppingCriterion for Oracle {
         let Judged { described, .. } = self.judge_seen(view, &seen, &tiles).ok()?;
         let audience = self.audience().then(view.audience);
         let described: Vec<Described> = described.into_iter().flatten().collect();
-        self.map_visible_noise(view.film.grid(), &described, audience)
+        self.map_noise(view.film.grid(), &described, audience)
     }
 
     /// Tiles that are not named count for the picture as they were when last described; they are described
@@ -509,10 +543,12 @@ impl StoppingCriterion for Oracle {
 
     /// How each tile was last described: stopped tiles count so for the picture, whatever has become of their
     /// neighbours, whose edges were read too.
+    #[cfg(feature = "files")]
     fn state(&self) -> Option<Vec<u8>> {
         container::payload(&self.described).ok()
     }
 
+    #[cfg(feature = "files")]
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
         let Ok(described) = container::unpack::<Vec<Option<LastDescribed>>>(state) else { return false };
         let sound = |(tile, seen): (Tile, &Option<LastDescribed>)| {
@@ -523,7 +559,7 @@ impl StoppingCriterion for Oracle {
                 && d.place == tile
                 && d.spp.is_finite()
                 && d.spp > 0.0
-                && self.model.descriptor().is_sound(d)
+                && self.model.parts().descriptor.is_sound(d)
         };
         let fits = [0, grid.len()].contains(&described.len()) && grid.tiles().zip(&described).all(sound);
         if fits {

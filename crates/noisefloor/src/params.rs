@@ -3,12 +3,14 @@
 use crate::display::{ToneMapping, ToneMappingError};
 use crate::tile::DEFAULT_TILE;
 use noisefloor_vision::Viewing;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// When a tile is judged next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 pub enum Schedule {
     /// After every `step` samples per pixel (Takouachet et al. 2017, §5.2: N = 100).
     Every {
@@ -89,7 +91,8 @@ impl Schedule {
 
 /// A straight line from the threshold of the observers in the training data to that of another audience: T′ =
 /// a·T + b.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Audience {
     /// Slope a, at least 0.
     pub slope: f64,
@@ -143,7 +146,8 @@ impl Audience {
 /// let params = noisefloor::Params::default().with_tile(64).with_max_spp(4000);
 /// assert_eq!((params.tile, params.min_spp, params.max_spp), (64, 16, 4000));
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub struct Params {
     /// Tile edge in pixels, 16…512; see [`crate::TileGrid`] for the last column and row. A tile stops as a

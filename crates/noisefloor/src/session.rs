@@ -695,6 +695,7 @@ impl<C: StoppingCriterion> Session<C> {
     }
 }
 
+#[cfg(feature = "files")]
 mod resume;
 pub(crate) mod rounds;
 #[cfg(test)]

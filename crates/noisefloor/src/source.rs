@@ -3,6 +3,7 @@
 use crate::rgb::Rgb;
 use crate::tile::Tile;
 use auto_impl::auto_impl;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -10,8 +11,9 @@ mod identity;
 pub use identity::{IdentityChange, SourceIdentity};
 
 /// What a source counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 pub enum Unit {
     /// Samples per pixel.
     SamplesPerPixel,
@@ -20,8 +22,9 @@ pub enum Unit {
 }
 
 /// What the same seed repeats. Each kind keeps what the next one promises.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 pub enum Repeats {
     /// Every sample: it follows from (seed, pixel, index of the sample), however requests are cut and
     /// whatever other tiles are asked for with it. Only rounding of the means differs.
@@ -34,8 +37,9 @@ pub enum Repeats {
 }
 
 /// Whether the samples of a batch are each of one pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 pub enum PixelNoise {
     /// Yes: the noise of pixels is independent. Verdicts are made for this.
     #[default]
@@ -46,8 +50,9 @@ pub enum PixelNoise {
 }
 
 /// How the numbers of samples that a source gives relate to those asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 pub enum Counts {
     /// As many as asked for; at its end what is left, and nothing from then on.
     Asked,
@@ -162,7 +167,8 @@ pub struct Request {
 /// A source of independent samples needs only [`Request::first`]. One of quasi-random points (Sobol, Halton,
 /// stratified) takes points `first`, `first` + 1, … of sequence `number`, scrambled independently of every other
 /// sequence. The samples of a sequence then complete each other, and the halves stay independent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Sequence {
     /// Which sequence: that of half A is 0, that of half B is 1.
     pub number: u32,

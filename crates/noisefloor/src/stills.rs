@@ -1,10 +1,11 @@
 //! Pictures rendered elsewhere: compared, described and judged.
 
-use crate::criterion::CriterionError;
+use crate::criterion::{CriterionError, Verdict};
 use crate::descriptor::Described;
 use crate::display::exposure::{self, NoisyPixel};
 use crate::display::{Display, ToneMapping, luminance};
-use crate::evidence::{Evidence, Rendering, Samples, TilePlanes, residual_scale};
+pub use crate::evidence::{Evidence, Samples};
+use crate::evidence::{Rendering, TilePlanes, residual_scale};
 use crate::nested::shared_samples;
 use crate::oracle::Oracle;
 use crate::rgb::Rgb;
@@ -334,7 +335,7 @@ impl<'a> SnapshotPair<'a> {
         self.samples
     }
 
-    /// Samples per pixel of the picture. Fewer than one is described as one: see [`SnapshotPair::describe`].
+    /// Samples per pixel of the picture. Fewer than one count as one: see [`SnapshotPair::judge`].
     pub fn image_spp(&self) -> f64 {
         self.image.spp
     }
@@ -349,12 +350,27 @@ impl<'a> SnapshotPair<'a> {
         self.image.pixels.iter().map(|&p| self.display.encode(p)).collect()
     }
 
+    /// Judges all tiles, in their order, each in its picture. A picture of less than one sample per pixel is judged as if
+    /// it had one; needs are then in multiples of what it has. [`SnapshotPair::notice`] says what speaks against
+    /// the pictures.
+    ///
+    /// # Errors
+    /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.
+    pub fn judge(&self, oracle: &Oracle, grid: TileGrid) -> Result<Vec<Verdict>, StillError> {
+        Ok(oracle.judge_all(&self.describe_tiles(oracle, grid)?))
+    }
+
     /// What a tile is judged by.
     ///
     /// # Errors
     /// [`StillError::Nested`] if nested pictures have as many samples, [`StillError::Tile`] if the tile does not
     /// lie in them.
+    #[cfg(feature = "internals")]
     pub fn planes(&self, tile: Tile) -> Result<TilePlanes, StillError> {
+        self.planes_of(tile)
+    }
+
+    fn planes_of(&self, tile: Tile) -> Result<TilePlanes, StillError> {
         Ok(TilePlanes { viewing: self.viewing, ..self.gather(tile)? })
     }
 
@@ -392,9 +408,19 @@ impl<'a> SnapshotPair<'a> {
     ///
     /// # Errors
     /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.
+    #[cfg(feature = "internals")]
     pub fn describe(&self, oracle: &Oracle, grid: TileGrid) -> Result<Vec<Described>, StillError> {
+        self.describe_tiles(oracle, grid)
+    }
+
+    pub(crate) fn describe_tiles(
+        &self,
+        oracle: &Oracle,
+        grid: TileGrid,
+    ) -> Result<Vec<Described>, StillError> {
         let tiles: Vec<Tile> = grid.tiles().collect();
-        let describe = |&tile: &Tile| Ok(oracle.describe(&self.planes(tile)?, self.image.spp.max(1.0))?);
+        let describe =
+            |&tile: &Tile| Ok(oracle.describe_tile(&self.planes_of(tile)?, self.image.spp.max(1.0))?);
         tiles.par_iter().map(describe).collect()
     }
 }

@@ -1,10 +1,17 @@
-//! What decides, a line or a support vector machine, and how sure it is. In f32 and without allocation;
-//! `noisefloor-learn` trains both.
+//! What decides, a line or a support vector machine, and how sure it is. In f32 and without allocation. With the feature
+//! `train`, machines are trained here, too; `noisefloor-learn` fits lines.
 
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "train")]
+mod train;
+#[cfg(feature = "train")]
+pub use train::{SvmParams, SvmTrainError, check_examples, fit_platt, fit_svm};
+
 /// Shifts and scales each number of a descriptor to mean 0 and standard deviation 1 over the training set.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Scaler {
     /// Mean of each number.
     pub mean: Vec<f32>,
@@ -52,7 +59,8 @@ impl Scaler {
 }
 
 /// A trained C-SVC with the kernel K(x, y) = exp(−γ‖x − y‖²) (Takouachet et al. 2017, §4.3).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Svm {
     /// γ.
     pub gamma: f32,
@@ -101,7 +109,8 @@ fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
 // A straight line through scaled numbers.
 
 /// What logistic regression learns: the decision value w·x + b.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Line {
     /// w, one weight for each scaled number.
     pub weights: Vec<f32>,
@@ -124,7 +133,8 @@ impl Line {
 // From decision values to probabilities.
 
 /// Platt's sigmoid P = 1/(1 + exp(a·f + b)) of a decision value f (Platt 1999).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Platt {
     /// Slope; negative where larger decision values are more likely "converged".
     pub a: f32,
@@ -151,7 +161,8 @@ pub(crate) fn from_log_odds(log_odds: f64) -> f32 {
 // From raw descriptors to probabilities.
 
 /// What decides on scaled descriptors.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub enum Machine {
     /// A straight line, by logistic regression: the bundled model's.
     Line(Line),
@@ -181,7 +192,8 @@ impl Machine {
 }
 
 /// Scaling, machine and calibration, as they were trained together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Classifier {
     /// From raw to scaled descriptors.
     pub scaler: Scaler,

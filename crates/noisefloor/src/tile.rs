@@ -1,6 +1,7 @@
 //! The image as a grid of tiles.
 
 use crate::rgb::Rgb;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -19,14 +20,14 @@ pub const MAX_PIXELS: usize = 1 << 28;
 ///
 /// # Errors
 /// [`TileError::Image`] if it is empty or too large.
-#[doc(hidden)]
-pub fn check_image(width: usize, height: usize) -> Result<(), TileError> {
+pub(crate) fn check_image(width: usize, height: usize) -> Result<(), TileError> {
     let fits = (1..=MAX_EDGE).contains(&width) && (1..=MAX_EDGE).contains(&height);
     if fits && width * height <= MAX_PIXELS { Ok(()) } else { Err(TileError::Image(width, height)) }
 }
 
 /// One tile: its place in the row-major order of the grid, and its pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Tile {
     /// Row-major place in the grid.
     pub index: usize,
@@ -122,8 +123,9 @@ pub enum TileError {
 /// assert_eq!((last.width, last.height), (128 + 32, 600 - 4 * 128));
 /// # Ok::<(), noisefloor::tile::TileError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(try_from = "Unchecked"))]
 pub struct TileGrid {
     width: usize,
     height: usize,
@@ -131,7 +133,7 @@ pub struct TileGrid {
 }
 
 /// A grid as it was read.
-#[derive(Deserialize)]
+#[cfg_attr(feature = "files", derive(Deserialize))]
 struct Unchecked {
     width: usize,
     height: usize,

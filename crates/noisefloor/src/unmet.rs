@@ -19,12 +19,12 @@
 //! draws it.
 
 use crate::display::{Display, luminance};
-use crate::evidence::TilePlanes;
+use crate::evidence::{Plane, TilePlanes};
 use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
-use ndarray::Array2;
 use noisefloor_vision::Viewing;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -43,7 +43,8 @@ const GREY: f32 = 0.18;
 const ACCIDENT: f32 = 1e7;
 
 /// What only one half has met, in a part of the picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct MetOnce {
     /// Luminance in the mean of all samples, summed over pixels.
     light: f64,
@@ -212,7 +213,7 @@ impl<'a> Unmet<'a> {
     /// What this would change on the screen if it fell on the tile and all around it, in places as large as
     /// people look at: the residual of luminance Y′, in the shape of the tile's planes. `None` if that is
     /// nothing.
-    pub(crate) fn shown(&self, film: &Film, display: &Display, tile: Tile) -> Option<Array2<f32>> {
+    pub(crate) fn shown(&self, film: &Film, display: &Display, tile: Tile) -> Option<Plane> {
         let light = self.light(film, tile);
         let most = (PEAK * light) as f32;
         let step = |on: f32| display.luma([on + most; 3]) - display.luma([on; 3]);

@@ -79,6 +79,7 @@ use group::{Likeness, TileWatch};
 use light::SeenLight;
 use points::Points;
 use rayon::prelude::*;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use shift::Shift;
 use std::fmt;
@@ -169,7 +170,8 @@ impl fmt::Debug for Fault {
 }
 
 /// How 8-bit numbers were turned into radiance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub enum Encoding {
     /// k/255, or k.
     Linear,
@@ -187,7 +189,8 @@ impl fmt::Display for Encoding {
 }
 
 /// What numbers values are that are none of 32-bit floats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub enum Precision {
     /// Integers, over their largest, sRGB-encoded or not, or as they are.
@@ -218,7 +221,8 @@ impl fmt::Display for Precision {
 }
 
 /// A likely fault of what a session was fed with. Its text has the number that it rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Error, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub enum Warning {
     /// Neighbouring pixels share samples.
@@ -327,7 +331,8 @@ fn colour(pixel: &Rgb) -> String {
 }
 
 /// Watches what one session gets.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct Watch {
     grid: TileGrid,
     /// Pixels share samples, as their source says.

@@ -4,7 +4,7 @@
 
 use noisefloor::{
     Oracle, TileGrid, ToneMapping,
-    evidence::{Rendering, Samples, TilePlanes},
+    stills::{Samples, SnapshotPair, Still},
     tile::DEFAULT_TILE,
 };
 use noisefloor_image::{LinearImage, read_exr};
@@ -25,40 +25,21 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    // Read and check both pictures.
+    // Read both pictures.
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [image, image_spp, other, other_spp] = args.as_slice() else { return Err(USAGE.into()) };
-    let (image, spp) = (read(image)?, samples(image_spp)?);
-    let (other, other_spp) = (read(other)?, samples(other_spp)?);
-    let size = (image.width, image.height);
-    if size != (other.width, other.height) {
-        return Err(format!(
-            "{}×{} and {}×{} pixels: not the same view",
-            size.0, size.1, other.width, other.height
-        )
-        .into());
-    }
-    if image.pixels == other.pixels {
-        return Err("both files hold the same samples: render one of them with another seed".into());
-    }
+    let (image, other) = (read(image, samples(image_spp)?)?, read(other, samples(other_spp)?)?);
 
-    // How the picture is shown, the same for both: people see display values, not radiance.
-    let display = ToneMapping::default().settle(&image.pixels);
-    let rendering = |picture, spp: u64| Rendering { pixels: picture, spp: spp as f64, rounding: 0.0 };
-    let pair = (rendering(&image.pixels[..], spp), rendering(&other.pixels[..], other_spp));
-
+    // Their difference has the noise of both; the part that is the noise of the first is judged.
     let oracle = Oracle::bundled();
-    let grid = TileGrid::new(image.width, image.height, DEFAULT_TILE)?;
-    let mut described = Vec::new();
-    for tile in grid.tiles() {
-        // The two differ by the noise of both; of it, the evidence is the noise of the first.
-        let planes = TilePlanes::from_pair(size, tile, &display, pair, Samples::Independent)
-            .ok_or("no samples, no evidence")?;
-        described.push(oracle.describe(&planes, spp as f64)?);
+    let (tone, how) = (ToneMapping::default(), Some(Samples::Independent));
+    let pair = SnapshotPair::new(oracle.model().evidence(), &image, &[&other], tone, how)?;
+    let grid = TileGrid::new(image.size.0, image.size.1, DEFAULT_TILE)?;
+    for warning in pair.notice(grid)?.warnings {
+        eprintln!("warning: {warning}");
     }
-    // A tile is judged in its picture, as people do.
     let mut converged = 0;
-    for (tile, verdict) in grid.tiles().zip(oracle.judge_described(&described)) {
+    for (tile, verdict) in grid.tiles().zip(pair.judge(&oracle, grid)?) {
         let says = match verdict.expected_spp {
             _ if verdict.converged => "no noise seen".into(),
             Some(expected) => format!("noise seen; clean at about {expected} spp"),
@@ -76,12 +57,9 @@ fn run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn read(path: &str) -> Result<LinearImage, Box<dyn Error>> {
-    let image = read_exr(path)?;
-    match image.pixels.iter().flatten().all(|value| value.is_finite()) {
-        true => Ok(image),
-        false => Err(format!("{path}: some pixels are not finite").into()),
-    }
+fn read(path: &str, spp: u64) -> Result<Still, Box<dyn Error>> {
+    let LinearImage { width, height, pixels, .. } = read_exr(path)?;
+    Ok(Still::new((width, height), pixels, spp as f64))
 }
 
 fn samples(text: &str) -> Result<u64, String> {

@@ -41,8 +41,8 @@ impl TileDescriptor for PlainNoise {
     }
 
     fn describe(&self, planes: &TilePlanes) -> Result<Vec<f32>, DescriptorError> {
-        let variance = planes.residual.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>();
-        Ok(vec![(0.5 * (variance / planes.residual.len() as f64 + self.floor).ln()) as f32])
+        let variance = planes.residual.values().iter().map(|&v| f64::from(v).powi(2)).sum::<f64>();
+        Ok(vec![(0.5 * (variance / planes.residual.values().len() as f64 + self.floor).ln()) as f32])
     }
 
     fn project(&self, raw: &mut [f32], factor: f32) -> bool {

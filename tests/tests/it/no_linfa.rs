@@ -21,7 +21,7 @@ fn dependencies(package: &str, features: &[&str]) -> String {
         .unwrap();
     let tree = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "cargo tree: {}", String::from_utf8_lossy(&output.stderr));
-    assert!(tree.starts_with(&format!("{package} v")) && tree.contains("ndarray"), "{tree}");
+    assert!(tree.starts_with(&format!("{package} v")), "{tree}");
     tree
 }
 
@@ -29,7 +29,7 @@ fn dependencies(package: &str, features: &[&str]) -> String {
 fn judging_alone_needs_no_machinery_of_training() {
     for features in [&["--no-default-features"][..], &[]] {
         let tree = dependencies("noisefloor", features);
-        assert!(!tree.contains("linfa"), "{features:?}:\n{tree}");
+        assert!(!tree.contains("linfa") && !tree.contains("ndarray"), "{features:?}:\n{tree}");
     }
     // Training does; so the test can fail
     assert!(dependencies("noisefloor-learn", &[]).contains("linfa-svm"));

@@ -217,7 +217,6 @@ pub(crate) fn in_picture(zones: Vec<(Zone, Vec<Alone>)>, descriptor: &Descriptor
 pub(crate) fn noise_level(planes: &TilePlanes) -> f32 {
     let (mask, t) = (NoiseMask::default(), planes.inner);
     let plane = mask.apply(&planes.residual);
-    let inner = plane.slice(ndarray::s![t.y..t.y + t.height, t.x..t.x + t.width]);
-    let variance = inner.iter().map(|v| v * v).sum::<f32>() / t.pixels() as f32;
+    let variance = plane.inside(t).map(|v| v * v).sum::<f32>() / t.pixels() as f32;
     (variance - mask.white_noise_gain() * planes.rounding * ROUNDING_LUMINANCE).max(0.0).sqrt()
 }

@@ -5,8 +5,8 @@ use crate::machine::Fitted;
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::score::score;
-use crate::svm::{SvmParams, SvmTrainError, fit_platt};
 use crate::table::{Table, Zone};
+use noisefloor::svm::{SvmParams, SvmTrainError, fit_platt};
 use noisefloor::{
     Audience, People,
     internal::nearest,

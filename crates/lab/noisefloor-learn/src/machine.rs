@@ -4,10 +4,10 @@ use crate::answer::Answer;
 use crate::line::{Weighed, fit_line};
 use crate::observers::observers_agreeing;
 use crate::params::{Learner, TrainError, TrainParams};
-use crate::svm::{SvmParams, check_examples, fit_svm};
 use crate::table::Zone;
 use ndarray::Array2;
 use noisefloor::svm::{Classifier, Machine, Platt, Scaler};
+use noisefloor::svm::{SvmParams, check_examples, fit_svm};
 
 /// Machine and scaler, before calibration.
 pub(crate) struct Fitted {

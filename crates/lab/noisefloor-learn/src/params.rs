@@ -1,7 +1,7 @@
 //! How a model is trained, and why it cannot be.
 
 use crate::choices::VISIBLE_CHOICES;
-use crate::svm::{SvmParams, SvmTrainError};
+use noisefloor::svm::{SvmParams, SvmTrainError};
 use noisefloor::{descriptor::Descriptor, model::ModelError};
 use thiserror::Error;
 

@@ -4,8 +4,8 @@ use crate::fit::{familiarity, fit_groups, parts};
 use crate::machine::examples;
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
-use crate::svm::SvmParams;
 use crate::table::Table;
+use noisefloor::svm::SvmParams;
 use noisefloor::{
     Model, People,
     model::{Scores, TrainingRecord},

@@ -1,7 +1,7 @@
 //! The reference keeps its promises about its own noise.
 
 use crate::kit::{batch, look, scene};
-use noisefloor::{ProgressiveSource, ToneMapping, descriptor::NoiseMask};
+use noisefloor::{ProgressiveSource, ToneMapping, descriptor::NoiseMask, evidence::Plane};
 use noisefloor_ptwne::{Emission, Material, Ptwne, RenderOptions, Scene, scenes};
 use std::error::Error;
 use std::ops::ControlFlow;
@@ -31,8 +31,8 @@ fn deviation(scene: Scene, size: usize) -> (f64, f64, usize) {
     let error = |(y, x): (usize, usize)| {
         (shown[0][y * size + x] - shown[1][y * size + x]) * std::f32::consts::FRAC_1_SQRT_2
     };
-    let mask = NoiseMask::default().apply(&ndarray::Array2::from_shape_fn((size, size), error));
-    let energy = mask.iter().map(|m| f64::from(*m).powi(2)).sum::<f64>() / (size * size) as f64;
+    let mask = NoiseMask::default().apply(&Plane::from_fn((size, size), error));
+    let energy = mask.values().iter().map(|m| f64::from(*m).powi(2)).sum::<f64>() / (size * size) as f64;
     (energy.sqrt(), own, unsettled)
 }
 

@@ -1,8 +1,8 @@
 //! What a descriptor is, and how one is named in files.
 
-use crate::evidence::TilePlanes;
+use crate::evidence::{Plane, TilePlanes};
 use crate::tile::Tile;
-use ndarray::Array2;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -66,7 +66,7 @@ pub trait TileDescriptor: fmt::Debug + Send + Sync {
     /// How visible the noise is at each pixel of the tiles that make up a picture (rows × columns each), as an
     /// amplitude in a unit of the descriptor's own, whose largest value in a tile is what the tile is judged by.
     /// `None` if the descriptor does not separate noise from picture.
-    fn visible_noise(&self, _tiles: &[Described]) -> Option<Vec<Array2<f32>>> {
+    fn visible_noise(&self, _tiles: &[Described]) -> Option<Vec<Plane>> {
         None
     }
 
@@ -114,7 +114,7 @@ pub struct DescriptorKind {
 /// let descriptor = Descriptor::default();
 /// let described = descriptor.describe_tile(&planes, 100.0)?;
 /// let map = &descriptor.visible_noise(&[described]).unwrap()[0];
-/// assert_eq!(map.dim(), (16, 32));
+/// assert_eq!(map.size(), (16, 32));
 /// // Windows of three quarters of a degree reach a little over the edge
 /// assert!(map[(8, 0)] > 1.1 * map[(8, 31)]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -123,8 +123,9 @@ pub struct DescriptorKind {
 pub struct Descriptor(Arc<dyn TileDescriptor>);
 
 /// A descriptor as files name it: `{"visible": {"window": 0.75, …}}` in JSON.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Named", into = "Named")]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(try_from = "Named", into = "Named"))]
 pub struct DescriptorSpec {
     /// [`TileDescriptor::name`].
     pub name: String,
@@ -167,7 +168,8 @@ pub enum DescriptorError {
 }
 
 /// A tile's own numbers, and what it takes to place them beside those of the rest of its picture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Described {
     /// What [`TileDescriptor::describe`] returned.
     pub own: Vec<f32>,

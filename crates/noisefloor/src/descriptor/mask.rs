@@ -1,13 +1,15 @@
 //! The noise mask: an image minus its 3×3 Gaussian blur (Takouachet et al. 2017, §5.1).
 
+use crate::evidence::Plane;
 use multiversion::multiversion;
-use ndarray::Array2;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// A checked mask width: σ of the 3×3 Gaussian, in pixels, within [0.3, 1.5] (Takouachet et al. 2017, §5.1).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "f32", into = "f32")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(try_from = "f32", into = "f32"))]
 pub struct NoiseMask {
     sigma: f32,
 }
@@ -60,18 +62,15 @@ impl NoiseMask {
     }
 
     /// The noise mask of a plane, of the same shape and unit. Pixels beyond the edge repeat the edge.
-    pub fn apply(&self, plane: &Array2<f32>) -> Array2<f32> {
-        let (height, width) = plane.dim();
-        let mut out = Array2::zeros((height, width));
+    pub fn apply(&self, plane: &Plane) -> Plane {
+        let (height, width) = plane.size();
+        let mut out = Plane::filled((height, width), 0.0);
         if width == 0 || height == 0 {
             return out;
         }
         let mut column = vec![0.0; width];
-        let plane = plane.as_standard_layout();
-        let row = |y: usize| plane.row(y).to_slice().expect("standard layout");
-        for (y, mut target) in out.rows_mut().into_iter().enumerate() {
-            let target = target.as_slice_mut().expect("standard layout");
-            let around = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
+        for (y, target) in out.values_mut().chunks_exact_mut(width).enumerate() {
+            let around = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| plane.row(y));
             self.apply_to_row(around, &mut column, target);
         }
         out
@@ -116,7 +115,7 @@ mod tests {
 
     #[test]
     fn an_impulse_gives_the_kernel() {
-        let mut plane = Array2::zeros((5, 5));
+        let mut plane = Plane::filled((5, 5), 0.0);
         plane[(2, 2)] = 1.0;
         let mask = NoiseMask::default();
         let (n, c) = mask.weights();
@@ -133,9 +132,9 @@ mod tests {
     fn white_noise_gain_is_the_energy_of_the_impulse_response() {
         for sigma in [0.3, 0.7, 1.0, 1.5] {
             let mask = NoiseMask::try_from(sigma).unwrap();
-            let mut plane = Array2::zeros((5, 5));
+            let mut plane = Plane::filled((5, 5), 0.0);
             plane[(2, 2)] = 1.0;
-            let energy: f32 = mask.apply(&plane).iter().map(|v| v * v).sum();
+            let energy: f32 = mask.apply(&plane).values().iter().map(|v| v * v).sum();
             assert!((energy - mask.white_noise_gain()).abs() < 1e-6);
         }
     }
@@ -151,7 +150,7 @@ mod tests {
         #[test]
         fn planes_without_detail_vanish(level in 0.0f32..1.0, slope in -0.01f32..0.01, sigma in 0.3f32..=1.5) {
             let mask = NoiseMask::try_from(sigma).unwrap();
-            let ramp = Array2::from_shape_fn((8, 9), |(y, x)| level + slope * (x as f32 + 2.0 * y as f32));
+            let ramp = Plane::from_fn((8, 9), |(y, x)| level + slope * (x as f32 + 2.0 * y as f32));
             let out = mask.apply(&ramp);
             // The mask of a ramp is zero but at the repeated edge.
             for y in 1..7 {
@@ -164,9 +163,9 @@ mod tests {
         #[test]
         fn is_linear(a in -2.0f32..2.0, seed in 0u32..100) {
             let mask = NoiseMask::default();
-            let plane = Array2::from_shape_fn((6, 7), |(y, x)| ((y * 31 + x * 17 + seed as usize) % 13) as f32 / 13.0);
-            let (scaled, out) = (mask.apply(&plane.mapv(|v| v * a)), mask.apply(&plane));
-            prop_assert!(scaled.iter().zip(&out).all(|(s, o)| (s - a * o).abs() < 1e-5));
+            let plane = Plane::from_fn((6, 7), |(y, x)| ((y * 31 + x * 17 + seed as usize) % 13) as f32 / 13.0);
+            let (scaled, out) = (mask.apply(&Plane::from_fn((6, 7), |at| plane[at] * a)), mask.apply(&plane));
+            prop_assert!(scaled.values().iter().zip(out.values()).all(|(s, o)| (s - a * o).abs() < 1e-5));
         }
     }
 }

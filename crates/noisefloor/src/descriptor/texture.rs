@@ -3,9 +3,8 @@
 use crate::descriptor::NoiseMask;
 use crate::{
     display::ROUNDING_LUMINANCE,
-    evidence::{HALO, TilePlanes},
+    evidence::{HALO, Plane, TilePlanes},
 };
-use ndarray::Array2;
 use std::cell::RefCell;
 
 /// Scales: full, half, quarter and eighth resolution.
@@ -62,8 +61,8 @@ struct Buffers {
 }
 
 /// The width of a plane, and its pixels, row-major.
-fn level(plane: &Array2<f32>) -> (usize, &[f32]) {
-    (plane.ncols(), plane.as_slice().expect("planes are in standard layout"))
+fn level(plane: &Plane) -> (usize, &[f32]) {
+    (plane.size().1, plane.values())
 }
 
 /// Mask energies of a plane with halo at full, half, quarter and eighth resolution, each on the grid of

@@ -21,8 +21,8 @@ use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDe
 use super::texture::texture_energy;
 use super::windows::{BLOCK, PictureContrast, WindowContrast, block_count, block_sums};
 use crate::descriptor::NoiseMask;
-use crate::{display::ROUNDING_LUMINANCE, evidence::TilePlanes};
-use ndarray::{Array2, ArrayView2, s};
+use crate::display::ROUNDING_LUMINANCE;
+use crate::evidence::{Plane, TilePlanes};
 use noisefloor_vision::{
     ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel, VisionWorkspace,
 };
@@ -180,17 +180,17 @@ impl TileDescriptor for Visible {
         self.with_picture(&picture, tiles, &noises)
     }
 
-    fn visible_noise(&self, tiles: &[Described]) -> Option<Vec<Array2<f32>>> {
+    fn visible_noise(&self, tiles: &[Described]) -> Option<Vec<Plane>> {
         let picture = PictureContrast::new(tiles);
         let map = |tile: &Described| {
             let (size, place) = ((tile.place.height, tile.place.width), tile.place);
             if tile.blocks.is_empty() {
-                return Array2::from_elem(size, f32::INFINITY);
+                return Plane::filled(size, f32::INFINITY);
             }
             let window = |y, x| picture.around((place.y + y) / BLOCK, (place.x + x) / BLOCK, tile.window);
             // All pixels of a block have one window around them
             let mut known = f32::NAN;
-            Array2::from_shape_fn(size, |(y, x)| {
+            Plane::from_fn(size, |(y, x)| {
                 if x == 0 || (place.x + x).is_multiple_of(BLOCK) {
                     known = window(y, x).amplitude(tile.spp, self.crest) as f32;
                 }
@@ -299,9 +299,8 @@ fn with_differences<T>(
             *model = None;
         }
         let model = model.get_or_insert_with(|| VisionModel::new(&planes.viewing));
-        let (rows, columns) = planes.image.dim();
-        let [picture, residual] = [&planes.image, &planes.residual]
-            .map(|plane| plane.as_slice().expect("planes are in standard layout"));
+        let (rows, columns) = planes.image.size();
+        let [picture, residual] = [&planes.image, &planes.residual].map(Plane::values);
         let t = planes.inner;
         let patch = ResidualPatch {
             pixels: ResidualPixels::Grey { picture, residual },
@@ -313,19 +312,13 @@ fn with_differences<T>(
     })
 }
 
-/// The pixels of the tile itself.
-fn inner<'a>(plane: &'a Array2<f32>, planes: &TilePlanes) -> ArrayView2<'a, f32> {
-    let t = planes.inner;
-    plane.slice(s![t.y..t.y + t.height, t.x..t.x + t.width])
-}
-
 /// The share of the amplitude of the residual that is not known rounding noise.
 fn without_rounding(planes: &TilePlanes) -> f64 {
     let known = f64::from(planes.rounding * ROUNDING_LUMINANCE);
     if known == 0.0 {
         return 1.0;
     }
-    let squares = inner(&planes.residual, planes).fold(0.0, |sum, &v| sum + f64::from(v) * f64::from(v));
+    let squares = planes.residual.inside(planes.inner).fold(0.0, |sum, v| sum + f64::from(v) * f64::from(v));
     (1.0 - known * planes.inner.pixels() as f64 / squares.max(f64::MIN_POSITIVE)).max(0.0).sqrt()
 }
 
@@ -341,7 +334,7 @@ fn noise_number(amplitude: f64) -> f32 {
 
 /// The mean logarithm of the tile's light, as a share of that of white.
 fn light(planes: &TilePlanes) -> f32 {
-    let mean = inner(&planes.image, planes).fold(0.0, |sum, &luma| sum + f64::from(luma))
+    let mean = planes.image.inside(planes.inner).fold(0.0, |sum, luma| sum + f64::from(luma))
         / planes.inner.pixels() as f64;
     ((mean as f32).clamp(0.0, 1.0).powf(GAMMA) + LIGHT_FLOOR).ln()
 }

@@ -1,6 +1,7 @@
 //! Tone mappings that somebody else has: a LUT, or any function.
 
 use crate::rgb::Rgb;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,11 +10,25 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 /// A function from exposed linear radiance to display values.
 type Map = dyn Fn(Rgb) -> Rgb + Send + Sync;
 
+/// What tells a curve from others: BLAKE3 of its identity, which files keep.
+#[cfg(feature = "files")]
+type Key = [u8; 32];
+/// What tells a curve from others: its identity.
+#[cfg(not(feature = "files"))]
+type Key = Vec<u8>;
+
+fn key(identity: &[u8]) -> Key {
+    #[cfg(feature = "files")]
+    return *blake3::hash(identity).as_bytes();
+    #[cfg(not(feature = "files"))]
+    identity.to_vec()
+}
+
 /// The functions of all curves that there are, by the digest of their identity: one that is read from a file
 /// has its function if this program holds the curve.
-static CURVES: Mutex<BTreeMap<[u8; 32], Weak<Map>>> = Mutex::new(BTreeMap::new());
+static CURVES: Mutex<BTreeMap<Key, Weak<Map>>> = Mutex::new(BTreeMap::new());
 
-fn curves() -> MutexGuard<'static, BTreeMap<[u8; 32], Weak<Map>>> {
+fn curves() -> MutexGuard<'static, BTreeMap<Key, Weak<Map>>> {
     CURVES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -37,7 +52,7 @@ fn curves() -> MutexGuard<'static, BTreeMap<[u8; 32], Weak<Map>>> {
 /// ```
 #[derive(Clone)]
 pub struct ToneCurve {
-    digest: [u8; 32],
+    key: Key,
     map: Arc<Map>,
 }
 
@@ -47,18 +62,19 @@ impl ToneCurve {
     /// that tells it from other curves: a name with a version and parameters, or the contents of a LUT. Of two
     /// functions with one identity the first is used, as long as one of its curves is there.
     pub fn new(identity: &[u8], map: impl Fn(Rgb) -> Rgb + Send + Sync + 'static) -> Self {
-        let digest = *blake3::hash(identity).as_bytes();
+        let key = key(identity);
         let mut curves = curves();
         curves.retain(|_, kept| kept.strong_count() > 0);
-        let kept = curves.get(&digest).and_then(Weak::upgrade);
+        let kept = curves.get(&key).and_then(Weak::upgrade);
         let map = kept.unwrap_or_else(|| Arc::new(map));
-        curves.insert(digest, Arc::downgrade(&map));
-        Self { digest, map }
+        curves.insert(key.clone(), Arc::downgrade(&map));
+        Self { key, map }
     }
 
     /// BLAKE3 of its identity, hexadecimal.
+    #[cfg(feature = "files")]
     pub fn digest(&self) -> String {
-        blake3::Hash::from_bytes(self.digest).to_hex().to_string()
+        blake3::Hash::from_bytes(self.key).to_hex().to_string()
     }
 
     /// Exposed linear radiance → display values in [0, 1].
@@ -69,22 +85,27 @@ impl ToneCurve {
 
 impl PartialEq for ToneCurve {
     fn eq(&self, other: &Self) -> bool {
-        self.digest == other.digest
+        self.key == other.key
     }
 }
 
 impl fmt::Debug for ToneCurve {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "ToneCurve({})", self.digest())
+        #[cfg(feature = "files")]
+        return write!(f, "ToneCurve({})", self.digest());
+        #[cfg(not(feature = "files"))]
+        write!(f, "ToneCurve({})", String::from_utf8_lossy(&self.key))
     }
 }
 
+#[cfg(feature = "files")]
 impl Serialize for ToneCurve {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         to.collect_str(&self.digest())
     }
 }
 
+#[cfg(feature = "files")]
 impl<'de> Deserialize<'de> for ToneCurve {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let text = String::deserialize(from)?;
@@ -94,7 +115,7 @@ impl<'de> Deserialize<'de> for ToneCurve {
         let unknown = || {
             D::Error::custom(format_args!("its tone curve {text} is another one: give the LUT that it had"))
         };
-        map.map(|map| Self { digest, map }).ok_or_else(unknown)
+        map.map(|map| Self { key: digest, map }).ok_or_else(unknown)
     }
 }
 

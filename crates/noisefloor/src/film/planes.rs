@@ -3,6 +3,7 @@
 use super::{Film, FilmError, Half};
 use crate::rgb::Rgb;
 use crate::tile::TileGrid;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 
@@ -12,7 +13,8 @@ const PIXEL: usize = 18;
 const STEP: usize = 1 << 20;
 
 /// All but the pixels.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct FilmHead {
     grid: TileGrid,
     /// For each half that is kept, whether rejected samples are counted by pixel.

@@ -1,5 +1,6 @@
 //! The textures that a model has been tried on.
 
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
 /// How many times the samples a tile gets that is unlike all known ones: its P is that of the same tile with this
@@ -14,7 +15,8 @@ pub(crate) const CAUTION: f32 = 2.0;
 /// of their zones are that near to a zone of another scene. The scores of held-out scenes are evidence for
 /// such tiles, and for no others. Noise plays no part, since every tile goes from noisier to cleaner than
 /// anything in the training data.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Familiarity {
     /// The scaled texture numbers of each training zone at its human threshold.
     pub zones: Vec<Vec<f32>>,

@@ -1,3 +1,4 @@
+use super::file::{FORMAT, ModelFile};
 use super::*;
 use crate::svm::{Line, Machine, Platt, Scaler, Svm};
 use proptest::prelude::*;
@@ -67,7 +68,6 @@ fn models_are_of_stills() {
 #[test]
 fn the_bundled_model_is_whole_small_and_scored() {
     let model = Model::bundled();
-    assert!(BUNDLED.len() < 1 << 20);
     assert_eq!(model.evidence(), Evidence::Halves);
     assert!(model.record().leave_one_scene_out.is_some_and(|s| s.zones == 167));
 }

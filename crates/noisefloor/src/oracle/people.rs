@@ -1,5 +1,6 @@
 //! The people who see no noise: which share of them is asked for, and how their thresholds scatter.
 
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -15,8 +16,9 @@ use thiserror::Error;
 /// assert!(People::DEFAULT.are_satisfied_by(0.97));
 /// assert!(People::new(1.0).is_err());
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
-#[serde(try_from = "f32", into = "f32")]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(try_from = "f32", into = "f32"))]
 pub struct People(f32);
 
 /// A share outside (0, 1).
@@ -93,7 +95,8 @@ impl fmt::Display for People {
 /// A model is learned from means over observers. What it expects in a scene is off by as much as it was in scenes
 /// that were left out; and people differ from their mean. The share of people in a scene like these who see no noise
 /// counts both.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Spread {
     /// Of the mean observer's threshold in scenes that were left out, around what was expected.
     pub scenes: f64,

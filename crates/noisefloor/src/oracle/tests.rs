@@ -6,7 +6,6 @@ use crate::model::tests::{changed, small};
 use crate::params::Audience;
 use crate::rgb::Rgb;
 use crate::svm::{Machine, Scaler, Svm};
-use ndarray::s;
 use noisefloor_testkit::Noise;
 use noisefloor_vision::Viewing;
 use std::collections::BTreeMap;
@@ -266,11 +265,11 @@ impl TileDescriptor for Residuals {
     }
 
     fn describe(&self, planes: &TilePlanes) -> Result<Vec<f32>, DescriptorError> {
-        let (Tile { x, y, width, height, .. }, expected) = (planes.inner, self.edge);
+        let (Tile { width, height, .. }, expected) = (planes.inner, self.edge);
         if (width, height) != (expected, expected) {
             return Err(DescriptorError::TileSize { expected, width, height });
         }
-        Ok(planes.residual.slice(s![y..y + height, x..x + width]).iter().copied().collect())
+        Ok(planes.residual.inside(planes.inner).collect())
     }
 }
 

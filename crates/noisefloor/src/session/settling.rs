@@ -1,6 +1,7 @@
 //! When an exposure is settled again, and from when on it counts as known.
 
 use crate::display::Display;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
 /// Standard error of the exposure, as a share of it, up to which tiles may converge.
@@ -12,7 +13,8 @@ const MOVED: f64 = 0.02;
 const GROWTH: f64 = 1.25;
 
 /// What the exposure was settled from.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct Settling {
     /// Samples in the film, over all pixels.
     pub(crate) samples: u64,

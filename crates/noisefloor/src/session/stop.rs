@@ -2,12 +2,14 @@
 
 use crate::criterion::Verdict;
 use crate::tile::Tile;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Why a tile gets no more samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum StopReason {
     /// The criterion is satisfied.
@@ -82,7 +84,8 @@ impl fmt::Display for StopReason {
 }
 
 /// A tile that is done.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Stop {
     /// The tile.
     pub tile: Tile,
@@ -100,7 +103,8 @@ pub struct Stop {
 
 /// Where a tile stands: open for its goal, or stopped. One that stopped at a limit has its goal still, for a session
 /// that is resumed.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct TileState {
     pub(crate) goal: Goal,
     /// The last.
@@ -109,7 +113,8 @@ pub(crate) struct TileState {
 }
 
 /// What a tile gets samples for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) enum Goal {
     /// Its next verdict, at so many samples per pixel, after a streak of verdicts in a row that said "converged".
     Verdict { spp: u64, streak: u32 },

@@ -1,7 +1,9 @@
 //! What the samples of a source depend on.
 
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+#[cfg(feature = "files")]
 use std::io::{self, Read};
 use thiserror::Error;
 
@@ -18,7 +20,8 @@ use thiserror::Error;
 /// let change = now.change_since(&kept).unwrap();
 /// assert_eq!(change.to_string(), "`wood.png` has changed");
 /// ```
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct SourceIdentity {
     options: String,
     /// BLAKE3 of each file, by its name.
@@ -64,6 +67,7 @@ impl SourceIdentity {
     }
 
     /// Adds a file by its contents. Names should be relative to the scene, so that a scene may be moved.
+    #[cfg(feature = "files")]
     pub fn add(&mut self, name: impl Into<String>, contents: &[u8]) {
         self.files.insert(name.into(), blake3::hash(contents).to_hex().to_string());
     }
@@ -72,6 +76,7 @@ impl SourceIdentity {
     ///
     /// # Errors
     /// Those of `contents`.
+    #[cfg(feature = "files")]
     pub fn add_from(&mut self, name: impl Into<String>, contents: impl Read) -> io::Result<()> {
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(contents)?;

@@ -5,6 +5,7 @@ use crate::display::luminance;
 use crate::film::Film;
 use crate::tile::{Tile, TileGrid};
 use rayon::prelude::*;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -28,7 +29,8 @@ const ROUGH: f64 = 1e-3;
 const ALIKE: f64 = 0.5;
 
 /// How tiles seem to have been mixed up: what they would have to be for their borders to fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub enum MixUp {
     /// Rows, of pixels or of tiles, are counted from the bottom.

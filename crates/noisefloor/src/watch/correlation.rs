@@ -3,6 +3,7 @@
 use super::shift::Shift;
 use super::values::{Ends, Values};
 use super::{CERTAIN, FACTOR, Fault, NOTABLE, STRONG, Warning};
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
 /// Concordance of a − b with a + b less its neighbours from which a seems much noisier than b. Running means have
@@ -19,7 +20,8 @@ const AGREED: f64 = 0.1;
 const LIKELY: f64 = 2.0;
 
 /// The correlation of two differences x and y, each of mean 0: Σxy with what it is measured by.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Correlation {
     sum: f64,
     squares: f64,
@@ -61,7 +63,8 @@ impl Correlation {
 
 /// How often two differences x and y have the same sign: Σ sign(xy)·√|xy|. The root keeps a few outliers,
 /// which most noise of renderers has, from hiding what all other pixels say.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Concordance {
     sum: f64,
     squares: f64,
@@ -111,7 +114,8 @@ impl Concordance {
 }
 
 /// Energies e and f that should be equal: Σ(e − f), with what it is measured by.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Energies {
     one: f64,
     other: f64,
@@ -151,7 +155,8 @@ impl Energies {
 }
 
 /// A sum of differences, with what it is measured by.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Mean {
     sum: f64,
     squares: f64,
@@ -175,7 +180,8 @@ impl Mean {
 }
 
 /// What was found in groups of batches.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Sums {
     /// Of a − c and b − d.
     pub(super) batches: Concordance,

@@ -4,6 +4,7 @@ use super::correlation::{Concordance, Correlation, Sums};
 use super::points::level;
 use super::values::{Ends, Values};
 use crate::rgb::Rgb;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
 /// Values that differ by less, relative to their size, are the same but for rounding.
@@ -22,14 +23,16 @@ const NEAR: f64 = 3.0;
 const MANY: u64 = 8;
 
 /// A batch at the watched pixels: the luminance of each, between that of its neighbours.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 struct WatchedBatch {
     spp: u64,
     light: Vec<[f32; 3]>,
 }
 
 /// What is kept of one tile.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct TileWatch {
     /// Batches so far.
     pub(super) batches: u64,

@@ -5,6 +5,7 @@ use super::points::level;
 use crate::display::luminance;
 use crate::film::Film;
 use crate::tile::{Tile, TilePixels};
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
 /// How many times as many samples as the batches before a batch has, on average, to be compared with them.
@@ -22,7 +23,8 @@ const LEAST: f64 = 5e-4;
 /// picture is made of. If all samples are alike and independent, d has the mean 0 at each pixel. Fireflies
 /// skew it, but not towards an alarm: if N of them make all noise, the batch, which has at most as many
 /// samples as the picture, has them all with p ≤ 2⁻ᴺ, and then z = √N.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct Shift {
     sum: f64,
     squares: f64,

@@ -3,6 +3,7 @@
 use super::{Encoding, LEAST_VALUES, Precision, Warning};
 use crate::display::{luminance, srgb_encode};
 use crate::rgb::Rgb;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::iter::Sum;
 
@@ -12,7 +13,8 @@ const NEAR: f32 = 4e-3;
 const LEAST_LEVELS: u32 = 8;
 
 /// What the watched values of the first batches have in common.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Values {
     seen: u64,
     /// How many are 8-bit numbers, and which: divided by 255, sRGB-decoded, whole.
@@ -45,7 +47,8 @@ fn divisor(mut a: u32, mut b: u32) -> u32 {
 }
 
 /// Values that are whole numbers of steps.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 struct Steps {
     count: u64,
     /// What all of them are multiples of: more than 1 if they are sums of a few samples that are 0 or 1.
@@ -55,7 +58,8 @@ struct Steps {
 }
 
 /// Binary digits of the significands of values that are not 0.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 struct Digits {
     /// The most that one has, and how many values have so many, in each of four binades (by the exponent modulo 4).
     most: u32,
@@ -108,7 +112,8 @@ impl Digits {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 struct Levels {
     count: u64,
     /// As of [`Steps`].
@@ -228,7 +233,8 @@ impl Values {
 }
 
 /// Noisy pixels, and those of them of which one batch of two is exactly 1.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Ends {
     pub(super) noisy: u64,
     pub(super) at_white: u64,

@@ -1,9 +1,8 @@
 //! The paper's descriptors: the tile and what it is compared with, pixel by pixel (Takouachet et al. 2017,
 //! §4.3, §5).
 
-use ndarray::{Array2, s};
 use noisefloor::descriptor::{Descriptor, DescriptorError, NoiseMask, TileDescriptor};
-use noisefloor::evidence::TilePlanes;
+use noisefloor::evidence::{Plane, TilePlanes};
 use std::collections::BTreeMap;
 
 /// What the paper ends with: the noise mask of the tile and of what it is compared with, pixel by pixel (§5).
@@ -50,13 +49,15 @@ impl TileDescriptor for PixelPair {
             return Err(DescriptorError::TileSize { expected, width: tile.width, height: tile.height });
         }
         // What is compared lies to either side of the middle
-        let pair = [0.5, -0.5].map(|share| &planes.image + &(&planes.residual * share));
-        let pair: [Array2<f32>; 2] = match self.mask {
+        let beside = |share: f32| {
+            Plane::from_fn(planes.image.size(), |at| planes.image[at] + planes.residual[at] * share)
+        };
+        let pair = [0.5, -0.5].map(beside);
+        let pair = match self.mask {
             Some(mask) => pair.each_ref().map(|picture| mask.apply(picture)),
             None => pair,
         };
-        let inner = s![tile.y..tile.y + tile.height, tile.x..tile.x + tile.width];
-        Ok(pair.iter().flat_map(|plane| plane.slice(inner).into_iter().copied()).collect())
+        Ok(pair.iter().flat_map(|plane| plane.inside(tile)).collect())
     }
 }
 

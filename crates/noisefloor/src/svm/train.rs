@@ -1,9 +1,9 @@
 //! Training of support vector machines and of the curve of probability, through linfa.
 
+use super::{Platt, Svm};
 use linfa::composing::platt_scaling::{Platt as LinfaPlatt, platt_newton_method};
 use linfa::prelude::*;
 use ndarray::{Array1, ArrayView2};
-use noisefloor::svm::{Platt, Svm};
 use thiserror::Error;
 
 /// Duality gap at which the solver ends; LIBSVM's default.
@@ -52,9 +52,8 @@ pub enum SvmTrainError {
     Linfa(#[from] linfa_svm::SvmError),
     /// Platt scaling failed.
     #[error(
-        "no curve of probability fits the decision values: whether noise was seen does not follow what was \
-         measured of \
-         it; check that every threshold stands beside its own zone, and that they are not all alike"
+        "no curve of probability fits the decision values: whether noise was seen does not follow what was measured of it; \
+         check that every threshold stands beside its own zone, and that they are not all alike"
     )]
     Platt(#[from] linfa::composing::platt_scaling::PlattError),
 }
@@ -137,7 +136,7 @@ const OBSERVERS: usize = 40;
 ///
 /// # Errors
 /// [`SvmTrainError::Platt`] if the fit does not converge.
-pub(crate) fn fit_platt(examples: &[(f32, f64)]) -> Result<Platt, SvmTrainError> {
+pub fn fit_platt(examples: &[(f32, f64)]) -> Result<Platt, SvmTrainError> {
     let each = |&(decision, p): &(f32, f64)| {
         (0..OBSERVERS).map(move |i| (f64::from(decision), (i as f64 + 0.5) / (OBSERVERS as f64) < p))
     };
