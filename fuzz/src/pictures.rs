@@ -26,7 +26,7 @@ pub(crate) fn exr_seeds() -> Vec<Vec<u8>> {
     let folder = Folder::new();
     let path = folder.write("seed.exr", "");
     let rgb: Vec<[f32; 3]> = (0..20 * 18).map(|i| [(i * 37 % 101) as f32 / 7.0, -0.5, 1e9]).collect();
-    let origin = SampleOrigin { source: "hall".into(), options: "01".into(), seed: 7, repeats: true };
+    let origin = SampleOrigin::new("hall", "01", 7, true);
     let facts = SampleFacts { samples: Some((16, 16)), origin: Some(origin) };
     let layers = RenderLayers { facts: Some(&facts), ..RenderLayers::rgb(20, 18, &rgb) };
     write_exr(&path, &layers).expect("a small picture");

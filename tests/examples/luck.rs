@@ -99,7 +99,7 @@ impl ProgressiveSource for Rare {
                 }
                 *pixel = [value as f32; 3];
             }
-            batches.push(Batch { tile, spp: samples, mean });
+            batches.push(Batch::new(tile, samples, mean));
         }
         Ok(batches)
     }

@@ -1,7 +1,7 @@
 //! What a verdict allocates. A program of its own, since counting takes an allocator of its own.
 
 use allocation_counter::{AllocationInfo, measure};
-use noisefloor::{Film, Oracle, StoppingCriterion, TileGrid, Viewing, criterion::View, display::Display};
+use noisefloor::{Film, Oracle, StoppingCriterion, TileGrid, criterion::View, display::Display};
 
 /// What the second verdict on all tiles of a picture allocates, on one thread.
 fn of_a_second_verdict(edge: usize, tiles: usize) -> AllocationInfo {
@@ -12,13 +12,7 @@ fn of_a_second_verdict(edge: usize, tiles: usize) -> AllocationInfo {
             film.add(tile.index, 50, &vec![[value; 3]; tile.pixels()]).expect("it fits");
         }
     }
-    let view = View {
-        film: &film,
-        display: &Display::SRGB,
-        viewing: Viewing::default(),
-        audience: noisefloor::Audience::TRAINED,
-        reference: None,
-    };
+    let view = View::new(&film, &Display::SRGB);
     let mut oracle = Oracle::bundled();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let mut judge = || drop(oracle.judge(&view, &tiles).expect("verdicts"));

@@ -38,7 +38,7 @@ impl ProgressiveSource for Callback {
                 tile: Some(tile.index),
                 cause: format!("it returned {status}").into(),
             };
-            if status == 0 { Ok(Batch { tile, spp, mean }) } else { Err(failed()) }
+            if status == 0 { Ok(Batch::new(tile, spp, mean)) } else { Err(failed()) }
         };
         requests.iter().map(batch).collect()
     }

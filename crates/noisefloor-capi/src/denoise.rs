@@ -109,7 +109,7 @@ pub(crate) unsafe fn guides(
     // SAFETY: promised by the caller.
     let pixels = |picture| unsafe { plane((width, height), picture, floats, "first_hits") };
     let half = |albedo, normal| -> Result<FirstHits, Failure> {
-        Ok(FirstHits { width, height, albedo: pixels(albedo)?, normal: pixels(normal)? })
+        Ok(FirstHits::new((width, height), pixels(albedo)?, pixels(normal)?))
     };
     Ok(Guides::new([half(pictures[0], pictures[1])?, half(pictures[2], pictures[3])?]))
 }

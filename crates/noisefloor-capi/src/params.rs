@@ -69,10 +69,12 @@ pub unsafe extern "C" fn nf_params_default(params: *mut NfParams) -> NfStatus {
 impl Default for NfParams {
     fn default() -> Self {
         let Params { tile, schedule, min_spp, max_spp, consecutive, audience, .. } = Params::default();
-        let (schedule, step) = match schedule {
-            Schedule::Every { step } => (NF_SCHEDULE_EVERY, step),
-            Schedule::Spaced { step } => (NF_SCHEDULE_SPACED, step),
-            Schedule::Growing { step } => (NF_SCHEDULE_GROWING, step),
+        let step = schedule.step();
+        let schedule = match schedule {
+            Schedule::Every { .. } => NF_SCHEDULE_EVERY,
+            Schedule::Spaced { .. } => NF_SCHEDULE_SPACED,
+            Schedule::Growing { .. } => NF_SCHEDULE_GROWING,
+            other => unreachable!("C has no number for {other:?}"),
         };
         Self {
             tile: tile as u32,

@@ -9,13 +9,12 @@ use crate::status::{Failure, NfStatus, guard, not_while_denoising};
 use crate::tone::curve;
 use noisefloor::{
     Checkpoint, Oracle, Params, Request, Rgb, Schedule, Session, StoppingCriterion, Tile, TileGrid,
-    ToneMapping,
+    ToneMapping, Verdict,
 };
-use noisefloor_denoise::DenoisedRecord;
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
 use std::ops::{Deref, DerefMut};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Film, oracle and limits of one picture.
 pub struct NfSession {
@@ -30,11 +29,10 @@ pub(crate) enum Judging {
     Denoised(DenoisedBy),
 }
 
-/// A session, and what became of its denoised pictures.
+/// A session that is here or elsewhere.
 pub(crate) struct Judged {
     /// Elsewhere while it judges in the background.
     session: Option<Session<Box<dyn StoppingCriterion + Send>>>,
-    pub(crate) record: Option<Arc<Mutex<DenoisedRecord>>>,
 }
 
 impl Deref for Judged {
@@ -53,15 +51,11 @@ impl DerefMut for Judged {
 
 impl Judging {
     fn fresh(&self, (width, height): (usize, usize), params: Params) -> Result<Judged, Failure> {
-        let (criterion, record): (Box<dyn StoppingCriterion + Send>, _) = match self {
-            Self::Noise(oracle) => (oracle.clone(), None),
-            Self::Denoised(denoised) => {
-                let quality = denoised.quality();
-                let record = quality.record();
-                (Box::new(quality), Some(record))
-            }
+        let criterion: Box<dyn StoppingCriterion + Send> = match self {
+            Self::Noise(oracle) => oracle.clone(),
+            Self::Denoised(denoised) => Box::new(denoised.quality()),
         };
-        Ok(Judged { session: Some(Session::new(width, height, criterion, params)?), record })
+        Ok(Judged { session: Some(Session::new(width, height, criterion, params)?) })
     }
 }
 
@@ -141,8 +135,8 @@ impl NfSession {
         let mut fresh =
             self.judging.fresh((self.grid.width(), self.grid.height()), locked.params().clone())?;
         fresh.set_pixels(locked.pixels());
-        let Judged { session: Some(session), record } = fresh else { return Ok(()) };
-        *locked = Judged { session: Some(session.resume(job, checkpoint)?), record };
+        let Judged { session: Some(session) } = fresh else { return Ok(()) };
+        *locked = Judged { session: Some(session.resume(job, checkpoint)?) };
         Ok(())
     }
 
@@ -358,8 +352,8 @@ pub unsafe extern "C" fn nf_session_jods_lost(
 ) -> NfStatus {
     // SAFETY: promised by the caller.
     unsafe {
-        of_tiles(session, (lost, capacity), "lost", |record, tile| {
-            record.jods_lost.get(tile).copied().unwrap_or(f64::NAN)
+        of_tiles(session, (lost, capacity), "lost", |verdict| {
+            verdict.and_then(|verdict| verdict.lost).unwrap_or(f64::NAN)
         })
     }
 }
@@ -376,18 +370,18 @@ pub unsafe extern "C" fn nf_session_undenoised(
 ) -> NfStatus {
     // SAFETY: promised by the caller.
     unsafe {
-        of_tiles(session, (undenoised, capacity), "undenoised", |record, tile| {
-            record.undenoised.get(tile) == Some(&true)
+        of_tiles(session, (undenoised, capacity), "undenoised", |verdict| {
+            verdict.is_some_and(|verdict| verdict.undenoised)
         })
     }
 }
 
-/// Writes what is recorded of each tile.
+/// Writes what the last verdict on each tile says of the denoised picture.
 unsafe fn of_tiles<T>(
     session: *const NfSession,
     (values, capacity): (*mut T, usize),
     name: &str,
-    of: impl Fn(&DenoisedRecord, usize) -> T,
+    of: impl Fn(Option<Verdict>) -> T,
 ) -> NfStatus {
     guard(|| {
         let session = handle::get(session)?;
@@ -395,11 +389,10 @@ unsafe fn of_tiles<T>(
         let room =
             unsafe { border::room::<MaybeUninit<T>>(values.cast(), capacity, session.grid.len(), name) }?;
         let judged = session.lock()?;
-        let record = judged.record.as_ref();
-        let record =
-            record.ok_or_else(|| Failure::new(NfStatus::Unavailable, "the session has no denoiser"))?;
-        let record = record.lock().unwrap_or_else(PoisonError::into_inner);
-        room.iter_mut().enumerate().for_each(|(tile, place)| _ = place.write(of(&record, tile)));
+        if let Judging::Noise(_) = session.judging {
+            return Err(Failure::new(NfStatus::Unavailable, "the session has no denoiser"));
+        }
+        room.iter_mut().enumerate().for_each(|(tile, place)| _ = place.write(of(judged.verdict(tile))));
         Ok(())
     })
 }

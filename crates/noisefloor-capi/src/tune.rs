@@ -120,6 +120,7 @@ pub unsafe extern "C" fn nf_tuning_next(tuning: *const NfTuning, step: *mut NfTu
             Next::Done(Ending::AtFinest { .. }) => over(NF_TUNING_AT_FINEST),
             Next::Done(Ending::Unchanged) => over(NF_TUNING_UNCHANGED),
             Next::Done(Ending::NotFalling { .. }) => over(NF_TUNING_NOT_FALLING),
+            other => unreachable!("C has no number for {other:?}"),
         };
         // SAFETY: promised by the caller.
         unsafe { border::write(step, next, "step") }
@@ -149,7 +150,7 @@ pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> N
             let what = "nf_tuning_tell answers nf_tuning_next, once; after the end there is nothing to tell";
             return Err(Failure::new(NfStatus::Argument, what.to_owned()));
         }
-        asked.tuning.tell(Excess { place, pictures, alone, ..Excess::new(ratio) });
+        asked.tuning.tell(Excess::new(ratio).at(place).of_pictures(pictures).with_alone(alone));
         Ok(())
     })
 }
@@ -286,7 +287,7 @@ unsafe fn pictures<const N: usize>(
 /// # Safety
 /// As [`border::write`].
 unsafe fn write(place: *mut NfExcess, excess: Excess) -> Result<(), Failure> {
-    let Excess { ratio, place: at, pictures, alone } = excess;
+    let Excess { ratio, place: at, pictures, alone, .. } = excess;
     let (x, y) = at.unwrap_or_default();
     let alone = alone.unwrap_or(0.0);
     // SAFETY: as for this function.

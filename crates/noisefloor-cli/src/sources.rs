@@ -279,7 +279,7 @@ impl SourceJob {
         let options = serde_json::to_vec(&Self { seed: 0, size: None, ..self.absolute()? })?;
         let options = blake3::hash(&options).to_hex()[..16].to_owned();
         let source = format!("{scene} by {source}");
-        Ok(Some(SampleOrigin { source, options, seed: self.seed, repeats }))
+        Ok(Some(SampleOrigin::new(source, options, self.seed, repeats)))
     }
 
     /// Most camera rays a pixel for albedo and normals, of each half, where they are not clean with fewer. Of the built-in

@@ -54,7 +54,7 @@ fn guide(render: &Path) -> Outcome<Option<FirstHits>> {
     }
     let albedo = read_exr(render.join("albedo.exr"))?;
     let normal = load(&render.join("normal.exr"))?;
-    Ok(Some(FirstHits { width: albedo.width, height: albedo.height, albedo: albedo.pixels, normal }))
+    Ok(Some(FirstHits::new((albedo.width, albedo.height), albedo.pixels, normal)))
 }
 
 fn validate(folder: &Path, oidn: &mut Oidn) -> Outcome<()> {

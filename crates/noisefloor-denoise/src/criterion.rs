@@ -42,7 +42,7 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 /// fewer samples go to where nothing asks for them (`docs/benchmarks/tiles.md`).
 ///
 /// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
-/// they are given. [`DenoisedRecord::compose`] shows such tiles as they were rendered.
+/// they are given. [`Verdict::undenoised`] says so, and [`compose`](crate::compose) shows such tiles as they were rendered.
 ///
 /// A verdict takes two denoisings, of the whole picture or, where the denoiser can do that, of what lies around open tiles: use a
 /// schedule with growing intervals, such as
@@ -79,7 +79,7 @@ impl<D: Denoiser> DenoisedQuality<D> {
         Self { passes, ..self }
     }
 
-    /// What the verdicts look at: updated by each of them.
+    /// What verdicts have looked at and have cost: updated by each of them.
     pub fn record(&self) -> Arc<Mutex<DenoisedRecord>> {
         Arc::clone(&self.record)
     }
@@ -174,7 +174,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         let all_errors = if unknown && parts != [all] { self.estimate(view, &[all])? } else { Vec::new() };
         let eyes = VisionModel::new(&view.viewing);
         let limit = self.lost / ESTIMATE_ERRS_BY;
-        let judged: Vec<Judged> = tiles
+        let verdicts: Vec<Verdict> = tiles
             .par_iter()
             .map_init(VisionWorkspace::default, |room, &tile| {
                 let eyes = &mut Eyes { model: &eyes, room };
@@ -184,37 +184,23 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             .collect::<Option<_>>()
             .expect("each tile is in a part");
 
-        let count = view.film.grid().len();
         let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
-        record.jods_lost.resize(count, f64::NAN);
-        record.undenoised.resize(count, false);
-        for (tile, judged) in tiles.iter().zip(&judged) {
-            record.jods_lost[tile.index] = judged.lost;
-            record.undenoised[tile.index] = judged.undenoised;
-        }
         all_errors.into_iter().chain(errors).for_each(|error| record.renew(error, tiles));
         record.seconds += began.elapsed().as_secs_f64();
         record.verdicts += 1;
-        Ok(judged.into_iter().map(|judged| judged.verdict).collect())
+        Ok(verdicts)
     }
 
-    /// Verdicts follow from film and display alone; what is kept is what reports say of tiles that have stopped.
+    /// Verdicts follow from film and display alone; what is kept is what reports say.
     fn state(&self) -> Option<Vec<u8>> {
         Some(self.record.lock().unwrap_or_else(PoisonError::into_inner).to_bytes())
     }
 
-    fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
-        let Some(record) = DenoisedRecord::from_bytes(grid.len(), state) else { return false };
+    fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
+        let Some(record) = DenoisedRecord::from_bytes(state) else { return false };
         *self.record.lock().unwrap_or_else(PoisonError::into_inner) = record;
         true
     }
-}
-
-/// What is found of a tile.
-struct Judged {
-    verdict: Verdict,
-    lost: f64,
-    undenoised: bool,
 }
 
 /// The vision model, and room for it.
@@ -262,13 +248,13 @@ fn judge_tile(
     tile: Tile,
     limit: f64,
     eyes: &mut Eyes<'_>,
-) -> Judged {
+) -> Verdict {
     let (film, spp) = (view.film, view.film.spp(tile.index));
     let evidence = film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
     let place = within(tile, *part);
     let (here, lost) = judged_by(error, place, limit, eyes);
     if lost <= limit {
-        return Judged { verdict: Verdict::new(evidence).expecting(Some(spp)), lost, undenoised: false };
+        return Verdict::new(evidence).expecting(Some(spp)).with_loss(lost, false);
     }
     let brightness_differs = error.part(place).shift() > 0.0;
     // What a denoiser smears however many samples it gets is done when the noise is: no tile takes more samples denoised.
@@ -280,10 +266,10 @@ fn judge_tile(
     let (of_noise, noise) = if on_denoised.0 >= on_rendered.0 { on_denoised } else { on_rendered };
     if of_noise <= limit {
         let verdict = Verdict::new(evidence).expecting(Some(spp)).with_brightness(brightness_differs);
-        return Judged { verdict, lost: of_noise, undenoised: evidence };
+        return verdict.with_loss(of_noise, evidence);
     }
     let verdict = Verdict::new(false).expecting(eyes.needed_by_either([&here, &noise], limit, spp));
-    Judged { verdict: verdict.with_brightness(brightness_differs), lost, undenoised: false }
+    verdict.with_brightness(brightness_differs).with_loss(lost, false)
 }
 
 /// The part of the error that a tile is judged by, its own or the square around it, and what that has lost.

@@ -210,7 +210,7 @@ impl DenoisedError {
         let (ratio, place) = worst.map_or((0.0, None), |(square, ratio)| {
             (*ratio, Some((square.x + square.width / 2, square.y + square.height / 2)))
         });
-        let worst = Excess { place, ..Excess::new(ratio) };
+        let worst = Excess::new(ratio).at(place);
         Ok(DenoisedExcess { worst, squares, map: self.map_of_jods_lost(&eyes)? })
     }
 

@@ -84,11 +84,9 @@ impl Guides {
     /// A rectangle of them, within the pictures.
     #[must_use]
     pub fn part(&self, part: Tile) -> Self {
-        let halves = self.halves.each_ref().map(|half| FirstHits {
-            width: part.width,
-            height: part.height,
-            albedo: cut(&half.albedo, half.width, part),
-            normal: cut(&half.normal, half.width, part),
+        let halves = self.halves.each_ref().map(|half| {
+            let [albedo, normal] = [&half.albedo, &half.normal].map(|plane| cut(plane, half.width, part));
+            FirstHits::new((part.width, part.height), albedo, normal)
         });
         Self { halves, clean: self.clean }
     }
@@ -100,7 +98,7 @@ impl Guides {
             a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
         };
         let (albedo, normal) = (mean(&a.albedo, &b.albedo), mean(&a.normal, &b.normal));
-        FirstHits { width: a.width, height: a.height, albedo, normal }
+        FirstHits::new((a.width, a.height), albedo, normal)
     }
 }
 

@@ -60,4 +60,4 @@ pub use guides::{GuideError, Guides};
 pub use mirrored::{DenoisePasses, MirrorMean};
 #[cfg(feature = "oidn")]
 pub use oidn::{OIDN, Oidn};
-pub use record::DenoisedRecord;
+pub use record::{DenoisedRecord, compose};

@@ -110,7 +110,7 @@ impl Denoiser for Oidn {
             Ok(made)
         };
         let (albedo, normal) = (one("albedo", &hits.albedo)?, one("normal", &hits.normal)?);
-        Ok(Some(FirstHits { albedo, normal, ..*hits }))
+        Ok(Some(FirstHits::new((hits.width, hits.height), albedo, normal)))
     }
 }
 

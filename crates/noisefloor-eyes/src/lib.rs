@@ -29,7 +29,7 @@
 
 use noisefloor::evidence::{Evidence, Samples};
 use noisefloor::stills::{SnapshotPair, Still};
-use noisefloor::{Audience, Oracle, TileGrid, ToneMapping, Viewing, viewing::ViewingParams};
+use noisefloor::{Audience, Oracle, TileGrid, ToneMapping, Viewing};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -198,8 +198,8 @@ impl Person {
 
     /// For sessions: the default display, at the person's pixels per degree.
     pub fn viewing(&self) -> Viewing {
-        let params = Viewing::default().params();
-        let seen = ViewingParams { pixels_per_degree: self.display.pixels_per_degree, ..params };
+        let mut seen = Viewing::default().params();
+        seen.pixels_per_degree = self.display.pixels_per_degree;
         seen.check().unwrap_or_default()
     }
 }
@@ -404,7 +404,7 @@ fn even_noise(seed: u32) -> Still {
     let normal = |pixel: u32| (0..12).map(|i| hash(12 * pixel + i)).sum::<f64>() - 6.0;
     let pixels = (0..EDGE * EDGE).map(|pixel| [(0.2 * (1.0 + 0.1 * normal(pixel))) as f32; 3]).collect();
     let edge = EDGE as usize;
-    Still { size: (edge, edge), pixels, spp: 64.0, display_referred: true, rounding: 0.0, origin: None }
+    Still::new((edge, edge), pixels, 64.0).displayed_as_it_is(0.0)
 }
 
 /// What a parser says, without its picture of the place.

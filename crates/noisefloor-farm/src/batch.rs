@@ -32,7 +32,7 @@ impl PlannedBatch {
 
     /// The request for it, in a picture of which it names this tile.
     pub(crate) fn request(&self, tile: Tile) -> Request {
-        let sequence = Sequence { number: self.sequence, first: self.point };
+        let sequence = Sequence::new(self.sequence, self.point);
         Request::new(tile, self.first, self.spp).in_sequence(sequence)
     }
 }

@@ -154,13 +154,12 @@ fn count(state: &mut FrameState, session: &Session, used_up: &[&ShardFile], bega
     state.merge_seconds += criterion_seconds;
     (state.tiles, state.open) = (session.film().grid().len(), session.open_tiles());
     (state.to_go, state.done) = (session.expected_samples_to_go(), session.is_done());
-    Clock { source_seconds, criterion_seconds, total_seconds: source_seconds + criterion_seconds }
+    Clock::new(source_seconds, criterion_seconds)
 }
 
 fn progress(session: &Session, seconds: f64) -> Progress {
     let (samples, active_tiles) = (session.film().total_samples(), session.open_tiles());
-    let now = TimelinePoint { seconds, samples, active_tiles };
-    Progress { now, tiles: session.film().grid().len(), eta_seconds: None }
+    Progress::new(TimelinePoint::new(seconds, samples, active_tiles), session.film().grid().len())
 }
 
 /// A merge of shards from the beginning, without a farm.
@@ -214,8 +213,7 @@ pub fn merge_shards<S: Studio>(
     set.find_overlaps(&session);
     studio.tell(News::Problems(set.problems()));
     let seconds: f64 = set.files().iter().map(ShardFile::seconds).sum();
-    let clock = Clock { source_seconds: seconds, criterion_seconds: 0.0, total_seconds: seconds };
-    files.write(&session, &progress(&session, seconds), Some(clock))?;
+    files.write(&session, &progress(&session, seconds), Some(Clock::new(seconds, 0.0)))?;
     let missing = session.next_batches();
     Ok(MergedShards {
         batches: merged.batches,

@@ -118,9 +118,9 @@ impl Stated {
         match (params.eotf, &self.curve) {
             (_, Curve::Srgb) if self.matrix.is_none() => Treatment::Keep,
             (Eotf::Pq, Curve::Pq) | (Eotf::Hlg, Curve::Hlg) if own_gamut() => Treatment::Keep,
-            (Eotf::Pq | Eotf::Hlg | Eotf::Linear, _) => Treatment::Refuse(self),
             (Eotf::Srgb | Eotf::Gamma(_), Curve::Srgb) if own_gamut() => Treatment::Keep,
             (Eotf::Srgb | Eotf::Gamma(_), _) => Treatment::Convert(self),
+            _ => Treatment::Refuse(self),
         }
     }
 

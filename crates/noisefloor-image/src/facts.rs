@@ -77,7 +77,7 @@ fn of_header(header: &Header) -> SampleFacts {
         let (source, seed) = (printable(stated("source")?), stated("seed")?.parse().ok()?);
         let (source, options) = source.rsplit_once(OPTIONS).unwrap_or((&source, ""));
         let (source, options) = (source.to_owned(), options.to_owned());
-        Some(SampleOrigin { source, options, seed, repeats: stated("repeats") == Some("samples") })
+        Some(SampleOrigin::new(source, options, seed, stated("repeats") == Some("samples")))
     };
     SampleFacts { samples: even.or_else(uneven), origin: origin() }
 }
@@ -113,7 +113,7 @@ pub(crate) fn sample_attributes(facts: &SampleFacts) -> [HashMap<Text, Attribute
         Some((fewest, most)) => lines += &format!("fewest={fewest}\nmost={most}\n"),
         None => {}
     }
-    if let Some(SampleOrigin { source, options, seed, repeats }) = &facts.origin {
+    if let Some(SampleOrigin { source, options, seed, repeats, .. }) = &facts.origin {
         let source = if options.is_empty() { source.clone() } else { format!("{source}{OPTIONS}{options}") };
         let repeats = if *repeats { "samples" } else { "nothing" };
         lines += &format!("seed={seed}\nrepeats={repeats}\nsource={}\n", latin(&printable(&source)));

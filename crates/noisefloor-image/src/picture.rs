@@ -75,6 +75,7 @@ impl Picture {
     pub fn into_still(self, spp: f64) -> Still {
         let (size, rounding) = (self.size(), self.rounding());
         let display_referred = matches!(self, Picture::Display(_));
-        Still { size, pixels: self.into_linear().pixels, spp, display_referred, rounding, origin: None }
+        let still = Still::new(size, self.into_linear().pixels, spp);
+        if display_referred { still.displayed_as_it_is(rounding) } else { still }
     }
 }

@@ -64,5 +64,5 @@ pub fn read_still_with(
         (None, Some((_, spp))) => spp as f64,
         (None, None) => return Err(PictureError::NoSamples { path: path.to_owned() }),
     };
-    Ok(Still { origin: facts.origin, ..picture.into_still(spp) })
+    Ok(picture.into_still(spp).with_origin(facts.origin))
 }

@@ -123,7 +123,7 @@ impl StackSource {
         let Some(index) = self.frames.iter().position(|frame| frame.first == request.first) else {
             let end = self.frames.last().map_or(0, |frame| frame.last);
             if request.first == end {
-                return Ok(Batch { tile, spp: 0, mean: Vec::new() });
+                return Ok(Batch::new(tile, 0, Vec::new()));
             }
             let starts = self.frames.iter().map(|frame| frame.first).chain([end]);
             let near = starts.min_by_key(|start| start.abs_diff(request.first)).unwrap_or(0);
@@ -145,7 +145,7 @@ impl StackSource {
                 .map(|(old, new)| difference(old, first, new, last))
                 .collect(),
         };
-        Ok(Batch { tile, spp: last - first, mean })
+        Ok(Batch::new(tile, last - first, mean))
     }
 
     fn check_tile(&self, tile: &Tile) -> Result<(), StackError> {

@@ -57,7 +57,7 @@ pub(crate) fn render(
         .map_init(|| Eye::new(scene), |eye, y| (0..width).map(|x| pixel(x, y, eye)).collect())
         .collect();
     let (albedo, normal) = rows.into_iter().flatten().unzip();
-    FirstHits { width, height, albedo, normal }
+    FirstHits::new((width, height), albedo, normal)
 }
 
 /// Means of albedo and normal over the rays of a pixel, and what they scatter by.

@@ -216,7 +216,7 @@ impl Ptwne {
 
     /// Renders one row of a tile: the mean of the samples of each pixel.
     fn render_row(&self, lens: &Lens, job: Job<'_>) {
-        let Job { request: Request { tile, first, spp, sequence }, y, empty, out } = job;
+        let Job { request: Request { tile, first, spp, sequence, .. }, y, empty, out } = job;
         let key = Key::new(self.options.seed);
         let place = Place { sample: first, sequence };
         let RenderOptions { max_depth, roulette, estimator, sampling, filter, clamp, .. } = self.options;
@@ -258,7 +258,7 @@ impl Ptwne {
         add(&self.tally.clamped, clamped);
     }
 
-    fn render(&self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+    fn render(&self, requests: &[Request], batches: &mut Vec<Batch>) -> Result<(), SourceError> {
         let (width, height) = (self.width, self.height);
         for Request { tile, .. } in requests {
             let (right, bottom) = (tile.x.saturating_add(tile.width), tile.y.saturating_add(tile.height));
@@ -269,16 +269,12 @@ impl Ptwne {
                 ));
             }
         }
-        let batch = |&Request { tile, spp, .. }: &Request| {
-            let pixels = if spp == 0 { 0 } else { tile.pixels() };
-            Batch { tile, spp, mean: vec![[0.0; 3]; pixels] }
-        };
-        let mut batches: Vec<Batch> = requests.iter().map(batch).collect();
+        Batch::prepare(batches, requests);
         // Rows of tiles are the jobs: so small that no thread waits long for the last one
         let lens = self.scene.lens(width, height);
         let jobs: Vec<Job<'_>> = requests
             .iter()
-            .zip(&mut batches)
+            .zip(batches)
             .flat_map(|(&request, batch)| {
                 let tile = request.tile;
                 let empty = self.is_empty(&lens, &tile);
@@ -287,7 +283,7 @@ impl Ptwne {
             })
             .collect();
         self.on_threads(|| jobs.into_par_iter().with_max_len(1).for_each(|job| self.render_row(&lens, job)));
-        Ok(batches)
+        Ok(())
     }
 
     /// Whether no ray through the tile can meet a surface.
@@ -362,7 +358,13 @@ impl ProgressiveSource for Ptwne {
     /// # Errors
     /// [`SourceError::Failed`] if a tile is partly outside the image.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        self.render(requests)
+        let mut batches = Vec::new();
+        self.render(requests, &mut batches)?;
+        Ok(batches)
+    }
+
+    fn sample_into(&mut self, requests: &[Request], batches: &mut Vec<Batch>) -> Result<(), SourceError> {
+        self.render(requests, batches)
     }
 
     /// # Errors
@@ -375,7 +377,7 @@ impl ProgressiveSource for Ptwne {
             self.on_threads(|| reference::render(&self.scene, size, key, &display, self.watch.as_ref()));
         let picture = picture.ok_or_else(|| self.fail(None, RenderError::Cancelled))?;
         self.reference_noise = Some(picture.noise);
-        Ok(Some(Reference { width: self.width, height: self.height, pixels: picture.pixels }))
+        Ok(Some(Reference::new((self.width, self.height), picture.pixels)))
     }
 
     /// Never fails.

@@ -44,14 +44,14 @@ impl Place {
     /// The sample after this one by `k`.
     #[inline]
     pub(crate) fn plus(self, k: u64) -> Self {
-        let Sequence { number, first } = self.sequence;
+        let Sequence { number, first, .. } = self.sequence;
         let first = first.wrapping_add(k);
-        Self { sample: self.sample.wrapping_add(k), sequence: Sequence { number, first } }
+        Self { sample: self.sample.wrapping_add(k), sequence: Sequence::new(number, first) }
     }
 
     /// A sample of a pixel that has only one sequence.
     pub(crate) fn only(sample: u64) -> Self {
-        Self { sample, sequence: Sequence { number: 0, first: sample } }
+        Self { sample, sequence: Sequence::new(0, sample) }
     }
 }
 
@@ -61,7 +61,7 @@ impl Sampler {
         match sampling {
             Sampling::Independent => Self::Independent(Rng::new(key, pixel, place.sample)),
             Sampling::Sobol => {
-                let Sequence { number, first } = place.sequence;
+                let Sequence { number, first, .. } = place.sequence;
                 // Odd numbers are the sequences of half B; those from 2 on, which no session asks for, have
                 // the upper bits
                 let (half, others) = (u64::from(number & 1), u64::from(number >> 1) << 33);
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn no_sequence_repeats_another() {
         let seed = |number, first| {
-            let place = Place { sample: 0, sequence: Sequence { number, first } };
+            let place = Place { sample: 0, sequence: Sequence::new(number, first) };
             Sampler::new(Sampling::Sobol, Key::new(3), 17, place).seed()
         };
         let mut seeds = Vec::new();

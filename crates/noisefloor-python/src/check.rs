@@ -27,7 +27,7 @@ impl Callback<'_, '_> {
             let message = format!("render returned shape ({height}, {width}, 3) for a tile of ({h}, {w}, 3)");
             return Err(FaultError::new_err(message));
         }
-        Ok(Batch { tile, spp, mean: pixels.into_owned() })
+        Ok(Batch::new(tile, spp, pixels.into_owned()))
     }
 }
 

@@ -3,10 +3,10 @@
 use crate::arrays::{Pixels, picture};
 use crate::errors::{Error, ParameterError, SizeError};
 use crate::oracle::PyOracle;
-use noisefloor::{Oracle, Rgb, Session, StoppingCriterion, source::FirstHits};
+use noisefloor::{Oracle, Rgb, StoppingCriterion, source::FirstHits};
 use noisefloor_denoise::{
-    AuxiliaryPictures, DenoiseError, DenoisePasses, DenoisedQuality, DenoisedRecord, Denoiser, Guides,
-    MirrorMean, NoisyPicture,
+    AuxiliaryPictures, DenoiseError, DenoisePasses, DenoisedQuality, Denoiser, Guides, MirrorMean,
+    NoisyPicture,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -16,16 +16,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Any criterion.
 pub(crate) type Criterion = Box<dyn StoppingCriterion + Send>;
-
-/// What becomes of denoised pictures, where there are any.
-pub(crate) type Record = Option<Arc<Mutex<DenoisedRecord>>>;
-
-/// A session, and what became of its denoised pictures.
-pub(crate) struct Judged {
-    /// Elsewhere while it judges in the background.
-    pub(crate) session: Option<Session<Criterion>>,
-    pub(crate) record: Record,
-}
 
 /// What a criterion is made from, again and again: a session that is resumed gets a new one.
 pub(crate) enum Judging {
@@ -67,9 +57,9 @@ impl Judging {
         })
     }
 
-    pub(crate) fn make(&self, py: Python<'_>) -> PyResult<(Criterion, Record)> {
+    pub(crate) fn make(&self, py: Python<'_>) -> PyResult<Criterion> {
         match self {
-            Self::Noise(oracle) => Ok((oracle.clone(), None)),
+            Self::Noise(oracle) => Ok(oracle.clone()),
             Self::Denoised { denoiser, lost, guides, passes, raised } => {
                 let function = Function {
                     denoiser: denoiser.clone_ref(py),
@@ -81,8 +71,7 @@ impl Judging {
                 if let Some(guides) = guides {
                     criterion = criterion.guided_by(Arc::clone(guides));
                 }
-                let record = criterion.record();
-                Ok((Box::new(criterion), Some(record)))
+                Ok(Box::new(criterion))
             }
         }
     }
@@ -196,7 +185,7 @@ fn passes_of(count: usize) -> PyResult<DenoisePasses> {
 fn guides([a, b]: Hits<'_>, size: (usize, usize)) -> PyResult<Guides> {
     let half = |[albedo, normal]: [Pixels<'_>; 2]| -> PyResult<FirstHits> {
         let copy = |pixels| pixels_of(&pixels, size, "first_hits");
-        Ok(FirstHits { width: size.0, height: size.1, albedo: copy(albedo)?, normal: copy(normal)? })
+        Ok(FirstHits::new(size, copy(albedo)?, copy(normal)?))
     };
     Ok(Guides::new([half(a)?, half(b)?]))
 }

@@ -250,15 +250,11 @@ impl PyParams {
                 arguments.set_item("tone_mapping", made(py, curve)?)?;
                 arguments.set_item("exposure", short(*exposure))?;
             }
+            other => unreachable!("Python has no name for {other:?}"),
         }
         arguments.set_item("viewing", params.viewing.to_string())?;
-        let (schedule, step) = match params.schedule {
-            Schedule::Every { step } => ("every", step),
-            Schedule::Spaced { step } => ("spaced", step),
-            Schedule::Growing { step } => ("growing", step),
-        };
-        arguments.set_item("schedule", schedule)?;
-        arguments.set_item("step", step)?;
+        arguments.set_item("schedule", params.schedule.name())?;
+        arguments.set_item("step", params.schedule.step())?;
         arguments.set_item("min_spp", params.min_spp)?;
         arguments.set_item("max_spp", params.max_spp)?;
         arguments.set_item("consecutive", params.consecutive)?;

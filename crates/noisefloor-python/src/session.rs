@@ -2,7 +2,7 @@
 
 use crate::arrays::{Pixels, picture, plane};
 use crate::errors::{Error, ParameterError, Raise, SizeError, file_error, whole};
-use crate::judging::{Criterion, Hits, Judged, Judging, Record, not_while_denoising};
+use crate::judging::{Criterion, Hits, Judging, not_while_denoising};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pickle::reduced;
@@ -25,7 +25,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 /// Film, oracle and limits of one picture: a renderer pushes samples, and is told which tiles need more.
 ///
@@ -54,26 +54,27 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// are given.
 #[pyclass(frozen, name = "Session", module = "noisefloor")]
 pub(crate) struct PySession {
-    judged: Mutex<Judged>,
+    /// Elsewhere while it judges in the background.
+    judged: Mutex<Option<Session<Criterion>>>,
     judging: Judging,
     pub(crate) grid: TileGrid,
     pixels: PixelNoise,
 }
 
 /// The session in a lock.
-struct MappedGuard<'a>(MutexGuard<'a, Judged>);
+struct MappedGuard<'a>(MutexGuard<'a, Option<Session<Criterion>>>);
 
 impl Deref for MappedGuard<'_> {
     type Target = Session<Criterion>;
 
     fn deref(&self) -> &Self::Target {
-        self.0.session.as_ref().expect("a session that is elsewhere is not locked")
+        self.0.as_ref().expect("a session that is elsewhere is not locked")
     }
 }
 
 impl DerefMut for MappedGuard<'_> {
     fn deref_mut(&mut self) -> &mut Self::Target {
-        self.0.session.as_mut().expect("a session that is elsewhere is not locked")
+        self.0.as_mut().expect("a session that is elsewhere is not locked")
     }
 }
 
@@ -89,34 +90,38 @@ impl PySession {
         params: Params,
         pixels: PixelNoise,
     ) -> PyResult<Self> {
-        let (session, record) = fresh(py, (width, height), &judging, params, pixels)?;
+        let session = fresh(py, (width, height), &judging, params, pixels)?;
         let grid = session.film().grid();
-        Ok(Self { grid, judged: Mutex::new(Judged { session: Some(session), record }), judging, pixels })
+        Ok(Self { grid, judged: Mutex::new(Some(session)), judging, pixels })
     }
 
     /// The session, for something short. Others may have the interpreter while this waits.
     fn attached(&self, py: Python<'_>) -> PyResult<MappedGuard<'_>> {
         let guard = MappedGuard(self.lock(py)?);
-        if guard.0.session.is_some() { Ok(guard) } else { Err(Error::new_err(AWAY)) }
+        if guard.0.is_some() { Ok(guard) } else { Err(Error::new_err(AWAY)) }
     }
 
-    fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Judged>> {
+    fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Option<Session<Criterion>>>> {
         not_while_denoising()?;
         self.judged.lock_py_attached(py).map_err(|_| Error::new_err(BROKEN))
     }
 
     /// Hands the session out, to judge in the background.
     pub(crate) fn lend(&self, py: Python<'_>) -> PyResult<Session<Criterion>> {
-        self.lock(py)?.session.take().ok_or_else(|| Error::new_err(AWAY))
+        self.lock(py)?.take().ok_or_else(|| Error::new_err(AWAY))
     }
 
     pub(crate) fn is_lent(&self, py: Python<'_>) -> PyResult<bool> {
-        Ok(self.lock(py)?.session.is_none())
+        Ok(self.lock(py)?.is_none())
     }
 
     pub(crate) fn take_back(&self, py: Python<'_>, session: Session<Criterion>) -> PyResult<()> {
-        self.lock(py)?.session = Some(session);
+        *self.lock(py)? = Some(session);
         Ok(())
+    }
+
+    fn if_denoised<T>(&self, of: impl FnOnce() -> PyResult<T>) -> PyResult<Option<T>> {
+        matches!(self.judging, Judging::Denoised { .. }).then(of).transpose()
     }
 
     /// The exception that a denoiser has raised, or that of an error.
@@ -142,8 +147,8 @@ impl PySession {
         work: impl FnOnce(&mut Session<Criterion>) -> T + Send,
     ) -> PyResult<T> {
         not_while_denoising()?;
-        let locked = |mut judged: MutexGuard<'_, Judged>| {
-            let session = judged.session.as_mut()?;
+        let locked = |mut judged: MutexGuard<'_, Option<Session<Criterion>>>| {
+            let session = judged.as_mut()?;
             Some(pool::run(|| work(session)))
         };
         let done = py.detach(|| self.judged.lock().map(locked).map_err(|_| BROKEN));
@@ -418,20 +423,17 @@ impl PySession {
     /// Just-objectionable differences that the denoised tiles have lost, by their last verdicts: float64 of shape
     /// (height, width), NaN before. None without a denoiser.
     fn jods_lost<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let guard = self.attached(py)?;
-        let Some(record) = &guard.0.record else { return Ok(None) };
-        let record = record.lock().unwrap_or_else(PoisonError::into_inner);
-        let lost = self.spread(|tile| record.jods_lost.get(tile).copied().unwrap_or(f64::NAN));
-        plane(py, self.size(), lost).map(Some)
+        let session = self.attached(py)?;
+        let lost = |tile| session.verdict(tile).and_then(|verdict| verdict.lost).unwrap_or(f64::NAN);
+        self.if_denoised(|| plane(py, self.size(), self.spread(lost)))
     }
 
     /// Where the picture to be shown is as rendered instead of denoised: bool of shape (height, width). The noise has lost no
     /// more than is allowed there, and what the denoiser makes of it has. None without a denoiser.
     fn undenoised<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<bool>>>> {
-        let guard = self.attached(py)?;
-        let Some(record) = &guard.0.record else { return Ok(None) };
-        let record = record.lock().unwrap_or_else(PoisonError::into_inner);
-        plane(py, self.size(), self.spread(|tile| record.undenoised.get(tile) == Some(&true))).map(Some)
+        let session = self.attached(py)?;
+        let undenoised = |tile| session.verdict(tile).is_some_and(|verdict| verdict.undenoised);
+        self.if_denoised(|| plane(py, self.size(), self.spread(undenoised)))
     }
 
     /// Writes a snapshot to a file, for resuming the session. The file is whole or not there.
@@ -454,9 +456,9 @@ impl PySession {
         let checkpoint = py.detach(|| Checkpoint::read(BufReader::new(file)));
         let checkpoint = checkpoint.map_err(|error| raise(&path, error))?;
         let mut guard = self.attached(py)?;
-        let (session, record) = fresh(py, self.size(), &self.judging, guard.params().clone(), self.pixels)?;
+        let session = fresh(py, self.size(), &self.judging, guard.params().clone(), self.pixels)?;
         let session = session.resume(job, checkpoint).map_err(|error| raise(&path, error))?;
-        *guard.0 = Judged { session: Some(session), record };
+        *guard.0 = Some(session);
         Ok(())
     }
 
@@ -472,11 +474,11 @@ impl PySession {
     ) -> PyResult<Self> {
         let (py, pixels) = (class.py(), noise(shared_pixels));
         let judging = Judging::from_python(judging, size)?;
-        let (session, record) = fresh(py, size, &judging, params.0, pixels)?;
+        let session = fresh(py, size, &judging, params.0, pixels)?;
         let checkpoint = Checkpoint::read(checkpoint).map_err(Raise::raise)?;
         let session = session.resume(PICKLED, checkpoint).map_err(Raise::raise)?;
         let grid = session.film().grid();
-        Ok(Self { judged: Mutex::new(Judged { session: Some(session), record }), judging, grid, pixels })
+        Ok(Self { judged: Mutex::new(Some(session)), judging, grid, pixels })
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -511,11 +513,11 @@ fn fresh(
     judging: &Judging,
     params: Params,
     pixels: PixelNoise,
-) -> PyResult<(Session<Criterion>, Record)> {
-    let (criterion, record) = judging.make(py)?;
+) -> PyResult<Session<Criterion>> {
+    let criterion = judging.make(py)?;
     let mut session = Session::new(width, height, criterion, params).map_err(Raise::raise)?;
     session.set_pixels(pixels);
-    Ok((session, record))
+    Ok(session)
 }
 
 /// Warns of what is likely to be wrong with samples.

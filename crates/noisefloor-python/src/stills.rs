@@ -123,7 +123,8 @@ fn sharing(name: &str) -> PyResult<Samples> {
 
 fn still(picture: Picture, spp: f64, what: &str) -> PyResult<Still> {
     let Picture { size, pixels, display_referred, rounding } = picture;
-    let still = Still { size, pixels, spp, display_referred, rounding, origin: None };
+    let still = Still::new(size, pixels, spp);
+    let still = if display_referred { still.displayed_as_it_is(rounding) } else { still };
     still.check().map_err(|error| PictureError::new_err(format!("{what}: {error}")))?;
     Ok(still)
 }

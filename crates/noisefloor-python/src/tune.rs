@@ -123,7 +123,7 @@ fn ratio(name: &str, value: f64) -> PyResult<f64> {
 
 /// With what is known of one picture.
 fn with_alone(excess: Excess, alone: Option<f64>) -> PyResult<Excess> {
-    Ok(Excess { alone: alone.map(|alone| ratio("alone", alone)).transpose()?, ..excess })
+    Ok(excess.with_alone(alone.map(|alone| ratio("alone", alone)).transpose()?))
 }
 
 fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Tuning> {
@@ -141,11 +141,8 @@ fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult
 
 fn ending(next: Next) -> Option<&'static str> {
     match next {
-        Next::Render { .. } => None,
-        Next::Done(Ending::Found { .. }) => Some("found"),
-        Next::Done(Ending::AtFinest { .. }) => Some("at-finest"),
-        Next::Done(Ending::Unchanged) => Some("unchanged"),
-        Next::Done(Ending::NotFalling { .. }) => Some("not-falling"),
+        Next::Done(ending) => Some(ending.name()),
+        _ => None,
     }
 }
 
@@ -179,7 +176,7 @@ impl PyTuning {
                 tuning.asked = true;
                 Some(each)
             }
-            Next::Done(_) => None,
+            _ => None,
         }
     }
 

@@ -258,7 +258,7 @@ impl PyStop {
 }
 
 impl From<Stop> for PyStop {
-    fn from(Stop { tile, spp, probability, reason, unfamiliar }: Stop) -> Self {
+    fn from(Stop { tile, spp, probability, reason, unfamiliar, .. }: Stop) -> Self {
         Self { tile: tile.into(), spp, probability, reason: reason.to_string(), unfamiliar }
     }
 }

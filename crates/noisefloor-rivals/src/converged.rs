@@ -77,13 +77,7 @@ mod tests {
         let grey = vec![Display::SRGB.encode([0.2; 3]); 64 * 64];
         let tiles: Vec<Tile> = film.grid().tiles().collect();
         let viewing: Viewing = viewing.parse().unwrap();
-        let view = View {
-            film,
-            display: &Display::SRGB,
-            viewing,
-            audience: noisefloor::Audience::TRAINED,
-            reference: Some(&grey),
-        };
+        let view = View::new(film, &Display::SRGB).seen_on(viewing).beside(&grey);
         ConvergedCvvdp::new(lost).judge(&view, &tiles)
     }
 

@@ -44,7 +44,7 @@
 //!         let mut flicker = |spp: u64| 0.2 + (self.0.uniform() - 0.5) / (spp as f64).sqrt();
 //!         let batch = |r: &Request| {
 //!             let mean = (0..r.tile.pixels()).map(|_| [flicker(r.spp) as f32; 3]).collect();
-//!             Batch { tile: r.tile, spp: r.spp, mean }
+//!             Batch::new(r.tile, r.spp, mean)
 //!         };
 //!         Ok(requests.iter().map(batch).collect())
 //!     }

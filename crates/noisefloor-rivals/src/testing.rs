@@ -1,7 +1,7 @@
 //! Films and sources of known noise, for tests.
 
 use noisefloor::{
-    Batch, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid, Viewing,
+    Batch, Film, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, TileGrid,
     criterion::View, display::Display,
 };
 use noisefloor_testkit::Noise;
@@ -10,13 +10,7 @@ static SRGB: Display = Display::SRGB;
 
 /// A look at a film through plain sRGB.
 pub(crate) fn view(film: &Film) -> View<'_> {
-    View {
-        film,
-        display: &SRGB,
-        viewing: Viewing::default(),
-        audience: noisefloor::Audience::TRAINED,
-        reference: None,
-    }
+    View::new(film, &SRGB)
 }
 
 /// An empty film of 64×64 pixels in four tiles.
@@ -66,7 +60,7 @@ impl ProgressiveSource for NoisySource {
             let pixels =
                 (0..r.tile.pixels()).map(|i| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width));
             let value = |(x, y)| [((self.picture)(x, y) * (1.0 + deviation * noise.normal())) as f32; 3];
-            Batch { tile: r.tile, spp: r.spp, mean: pixels.map(value).collect() }
+            Batch::new(r.tile, r.spp, pixels.map(value).collect())
         };
         Ok(requests.iter().map(sample).collect())
     }

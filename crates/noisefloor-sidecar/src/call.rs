@@ -93,7 +93,7 @@ pub(crate) fn batches(
     let mut pixels = rgb(&payload);
     let batches = given().map(|(request, samples)| {
         let pixels = pixels.by_ref().take(if samples > 0 { request.tile.pixels() } else { 0 });
-        Batch { tile: request.tile, spp: samples, mean: pixels.collect() }
+        Batch::new(request.tile, samples, pixels.collect())
     });
     Ok(batches.collect())
 }

@@ -147,7 +147,7 @@ impl CommandSource {
             self.check_whole(&image, &tile, command)?;
             cut(&image, &tile)
         };
-        let batch = Batch { tile, spp: samples, mean };
+        let batch = Batch::new(tile, samples, mean);
         self.light.check(&batch.mean)?;
         Ok(batch)
     }
@@ -161,7 +161,7 @@ impl CommandSource {
         self.check_whole(&image, &all, command)?;
         let mut batches = Vec::with_capacity(requests.len());
         for Request { tile, .. } in requests {
-            let batch = Batch { tile: *tile, spp: samples, mean: cut(&image, tile) };
+            let batch = Batch::new(*tile, samples, cut(&image, tile));
             self.light.check(&batch.mean)?;
             batches.push(batch);
         }

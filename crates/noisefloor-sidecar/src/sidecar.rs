@@ -262,7 +262,7 @@ impl ProgressiveSource for Sidecar {
                 rgb(payload).map(|pixel| pixel.map(cut)).collect()
             };
             let (albedo, normal) = (within(albedo, 0.0), within(normal, -1.0));
-            Ok(first_hits.then_some(FirstHits { width, height, albedo, normal }))
+            Ok(first_hits.then_some(FirstHits::new((width, height), albedo, normal)))
         };
         self.call("rendering first hits", &[], &request, 2 * width * height, read)
             .map_err(|error| self.failed(error))

@@ -35,7 +35,7 @@
 //!                     mean.push([(sum / spp as f64) as f32; 3]);
 //!                 }
 //!             }
-//!             batches.push(Batch { tile, spp, mean });
+//!             batches.push(Batch::new(tile, spp, mean));
 //!         }
 //!         Ok(batches)
 //!     }

@@ -30,6 +30,7 @@ pub struct Chromaticities {
 
 /// Chromaticities that no display has.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum ChromaticityError {
     /// Out of range.
     #[error("no light has the chromaticity {x}:{y}: CIE 1931 x must lie within 0…1, y within 0.0001…1")]

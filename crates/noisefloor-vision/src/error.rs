@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// Pictures that cannot be compared.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VisionError {
     /// Too small or too large.
     #[error(

@@ -5,6 +5,7 @@ use crate::viewing::{Eotf, Primaries, Viewing, ViewingParams};
 
 /// Named viewing conditions.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ViewingPreset {
     /// Its name on the command line.
     pub name: &'static str,

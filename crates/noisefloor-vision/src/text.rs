@@ -17,6 +17,7 @@ const KEYS: &str = "ppd, resolution, diagonal, distance, peak, black, contrast, 
 
 /// Text that names no viewing conditions.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum ViewingTextError {
     /// No such preset.
     #[error(

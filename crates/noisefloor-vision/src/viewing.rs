@@ -12,6 +12,7 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Eotf {
     /// IEC 61966-2-1; code values in [0, 1].
     #[default]
@@ -33,6 +34,7 @@ pub enum Eotf {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Primaries {
     /// ITU-R BT.709, those of sRGB; white is D65.
     #[default]
@@ -67,6 +69,7 @@ impl From<Chromaticities> for Primaries {
 /// Unchecked viewing conditions. [`ViewingParams::check`] makes them a [`Viewing`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Deserialize))]
+#[non_exhaustive]
 pub struct ViewingParams {
     /// Pixels per degree of visual angle in the centre of the picture, within 1…2000.
     pub pixels_per_degree: f64,
@@ -109,6 +112,7 @@ impl Serialize for ViewingParams {
 
 /// Viewing conditions that no display has.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum ViewingError {
     /// Pixels per degree out of range.
     #[error("pixels per degree must lie within 1…2000, not {0}: check resolution, diagonal and distance")]

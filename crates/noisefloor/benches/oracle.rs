@@ -5,8 +5,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use noisefloor::{
-    Film, Oracle, Params, Rgb, Session, StoppingCriterion, TileGrid, Viewing, criterion::View,
-    descriptor::NoiseMask, display::Display, evidence::TilePlanes,
+    Film, Oracle, Params, Rgb, Session, StoppingCriterion, TileGrid, criterion::View, descriptor::NoiseMask,
+    display::Display, evidence::TilePlanes,
 };
 use noisefloor_testkit::Noise;
 use std::hint::black_box;
@@ -43,13 +43,7 @@ fn verdict(c: &mut Criterion) {
     group.bench_function("query", |b| {
         b.iter(|| oracle.model().judge(black_box(&numbers)));
     });
-    let view = View {
-        film: &film,
-        display: &display,
-        viewing: Viewing::default(),
-        audience: noisefloor::Audience::TRAINED,
-        reference: None,
-    };
+    let view = View::new(&film, &display);
     // All on one core, as the rest
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     group.bench_function("verdict", |b| {
@@ -79,13 +73,7 @@ fn pictures(c: &mut Criterion) {
         let (film, display) = (film(edge), Display::SRGB);
         let tiles: Vec<_> = film.grid().tiles().collect();
         let mut oracle = Oracle::bundled();
-        let view = View {
-            film: &film,
-            display: &display,
-            viewing: Viewing::default(),
-            audience: noisefloor::Audience::TRAINED,
-            reference: None,
-        };
+        let view = View::new(&film, &display);
         group.throughput(Throughput::Elements((edge * edge) as u64));
         group.bench_function(format!("{edge}x{edge}"), |b| b.iter(|| oracle.judge(&view, black_box(&tiles))));
     }

@@ -45,6 +45,7 @@ use std::thread::{self, JoinHandle};
 
 /// What becomes of a pass while as many wait as may.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WhenFull {
     /// [`Background::judge`] waits until there is room.
     Wait,

@@ -14,6 +14,7 @@ use thiserror::Error;
 
 /// What a criterion looks at.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct View<'a> {
     /// All samples so far.
     pub film: &'a Film,
@@ -30,6 +31,23 @@ pub struct View<'a> {
 }
 
 impl<'a> View<'a> {
+    /// A film on the default display, for the observers of the training data, without a reference.
+    pub fn new(film: &'a Film, display: &'a Display) -> Self {
+        Self { film, display, viewing: Viewing::default(), audience: Audience::TRAINED, reference: None }
+    }
+
+    /// The same on another display.
+    #[must_use]
+    pub fn seen_on(self, viewing: Viewing) -> Self {
+        Self { viewing, ..self }
+    }
+
+    /// The same with [`View::reference`].
+    #[must_use]
+    pub fn beside(self, reference: &'a [Rgb]) -> Self {
+        Self { reference: Some(reference), ..self }
+    }
+
     /// None before the display is settled.
     pub(crate) fn of(
         film: &'a Film,
@@ -64,6 +82,7 @@ impl Needs {
 /// said by [`Verdict::expected_spp`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[non_exhaustive]
 pub struct ExpectedThreshold {
     /// Samples per pixel below which it lies with a probability of 10 %.
     pub low: u64,
@@ -71,6 +90,14 @@ pub struct ExpectedThreshold {
     pub median: u64,
     /// Samples per pixel below which it lies with a probability of 90 %.
     pub high: u64,
+}
+
+impl ExpectedThreshold {
+    /// The same for whoever needs another number of samples.
+    #[must_use]
+    pub fn map(self, samples: impl Fn(u64) -> u64) -> Self {
+        Self { low: samples(self.low), median: samples(self.median), high: samples(self.high) }
+    }
 }
 
 /// What a criterion says about one tile.
@@ -103,6 +130,11 @@ pub struct Verdict {
     /// Whether what is to be shown of the tile in place of its samples, such as a denoised picture, is brighter or
     /// darker than they are, by more than their noise explains.
     pub brightness_differs: bool,
+    /// Just-objectionable differences (JOD) that what is to be shown of the tile has lost against the converged picture, by
+    /// the estimate, if the criterion judges that and not the samples.
+    pub lost: Option<f64>,
+    /// Whether the tile is to be shown as rendered where other tiles are denoised.
+    pub undenoised: bool,
 }
 
 impl Verdict {
@@ -119,6 +151,11 @@ impl Verdict {
     /// The same with [`Verdict::brightness_differs`].
     pub fn with_brightness(self, brightness_differs: bool) -> Self {
         Self { brightness_differs, ..self }
+    }
+
+    /// The same with [`Verdict::lost`] and [`Verdict::undenoised`].
+    pub fn with_loss(self, lost: f64, undenoised: bool) -> Self {
+        Self { lost: Some(lost), undenoised, ..self }
     }
 
     /// The same with [`Verdict::probability`], which no unfamiliar texture has lowered.

@@ -44,6 +44,7 @@ pub fn luminance([r, g, b]: Rgb) -> f32 {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum ToneMapping {
     /// The photographic operator, global form (Reinhard et al. 2002, eqs. 1–4).
     Reinhard {

@@ -63,6 +63,7 @@ impl From<SessionError> for DriverError {
 /// One point of a run's history.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[non_exhaustive]
 pub struct TimelinePoint {
     /// Seconds that the driver has run.
     pub seconds: f64,
@@ -72,8 +73,16 @@ pub struct TimelinePoint {
     pub active_tiles: usize,
 }
 
+impl TimelinePoint {
+    /// A point of a run that is kept elsewhere.
+    pub fn new(seconds: f64, samples: u64, active_tiles: usize) -> Self {
+        Self { seconds, samples, active_tiles }
+    }
+}
+
 /// What happens in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Event {
     /// The quick reference has been rendered.
     ReferenceReady {
@@ -88,6 +97,7 @@ pub enum Event {
 
 /// Progress of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Time, samples and open tiles.
     pub now: TimelinePoint,
@@ -97,9 +107,17 @@ pub struct Progress {
     pub eta_seconds: Option<f64>,
 }
 
+impl Progress {
+    /// How far a run is whose end nobody has estimated.
+    pub fn new(now: TimelinePoint, tiles: usize) -> Self {
+        Self { now, tiles, eta_seconds: None }
+    }
+}
+
 /// How the time of all runs of a driver was spent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[non_exhaustive]
 pub struct Clock {
     /// Seconds in the source, including its reference.
     pub source_seconds: f64,
@@ -107,6 +125,13 @@ pub struct Clock {
     pub criterion_seconds: f64,
     /// Seconds in total.
     pub total_seconds: f64,
+}
+
+impl Clock {
+    /// Of a run that did nothing else.
+    pub fn new(source_seconds: f64, criterion_seconds: f64) -> Self {
+        Self { source_seconds, criterion_seconds, total_seconds: source_seconds + criterion_seconds }
+    }
 }
 
 /// Drives a source until a criterion is satisfied.
@@ -139,6 +164,8 @@ pub struct Driver<S, C = Box<dyn StoppingCriterion + Send>> {
     session: Session<C>,
     time_limit: Option<Duration>,
     cancel: Arc<AtomicBool>,
+    /// The last ones, for their memory.
+    batches: Vec<Batch>,
     timeline: Vec<TimelinePoint>,
     clock: Clock,
     /// Samples in the film before the run.
@@ -166,6 +193,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             session,
             time_limit: None,
             cancel,
+            batches: Vec::new(),
             timeline,
             clock,
             samples_before: 0,
@@ -255,9 +283,13 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
             let requests = self.plan();
             let began = Instant::now();
             // Nothing is missing where an earlier run failed to judge
-            let batches = if requests.is_empty() { Vec::new() } else { self.source.sample(&requests)? };
+            if !requests.is_empty() {
+                self.source.sample_into(&requests, &mut self.batches)?;
+            }
             self.clock.source_seconds += began.elapsed().as_secs_f64();
-            let exhausted = self.take(&requests, batches)?;
+            let batches = std::mem::take(&mut self.batches);
+            let exhausted = self.take(&requests, &batches)?;
+            self.batches = batches;
 
             let mut stops = self.close_exhausted(&exhausted);
 
@@ -314,8 +346,9 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     }
 
     /// Files the batches of one call; returns the tiles that have no more.
-    fn take(&mut self, requests: &[Request], batches: Vec<Batch>) -> Result<Vec<usize>, DriverError> {
+    fn take(&mut self, requests: &[Request], batches: &[Batch]) -> Result<Vec<usize>, DriverError> {
         let broken = |what| SourceError::Contract { name: self.source.info().name, what };
+        let batches = if requests.is_empty() { &[] } else { batches };
         if batches.len() != requests.len() {
             let what = format!("{} batches for {} requests", batches.len(), requests.len());
             return Err(broken(what).into());

@@ -545,6 +545,7 @@ mod tests;
 
 /// A batch that the film refuses.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FilmError {
     /// The tile does not exist.
     #[error("tile {0} does not exist: the film has {1}")]

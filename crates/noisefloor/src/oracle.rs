@@ -146,17 +146,13 @@ impl Oracle {
         Some(Verdict {
             converged,
             probability: seen(trained.probability),
-            threshold: trained.threshold.map(|t| ExpectedThreshold {
-                low: audience.samples(t.low),
-                median: audience.samples(t.median),
-                high: audience.samples(t.high),
-            }),
+            threshold: trained.threshold.map(|threshold| threshold.map(|spp| audience.samples(spp))),
             expected_spp,
             doubted: trained.doubted,
             unmet: trained.unmet,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
-            brightness_differs: false,
+            ..Verdict::default()
         })
     }
 
@@ -175,11 +171,9 @@ impl Oracle {
                 // If only the noise changes, as noise does: σ ∝ 1/√n
                 self.crossing(|factor| curve.at(factor)).map(|f| (spp as f64 * f64::from(f)).ceil() as u64)
             },
-            doubted: false,
-            unmet: false,
             unfamiliar: judgement.unfamiliar,
             probability_without_penalty: Some(judgement.probability_without_penalty),
-            brightness_differs: false,
+            ..Verdict::default()
         }
     }
 

@@ -11,6 +11,7 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Schedule {
     /// After every `step` samples per pixel (Takouachet et al. 2017, §5.2: N = 100).
     Every {
@@ -51,7 +52,17 @@ impl Schedule {
     /// early verdict is cheap, late samples are not.
     const APPROACH: f64 = 0.75;
 
-    pub(crate) fn step(self) -> u64 {
+    /// `every`, `spaced` or `growing`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Every { .. } => "every",
+            Self::Spaced { .. } => "spaced",
+            Self::Growing { .. } => "growing",
+        }
+    }
+
+    /// Samples per pixel between two verdicts, or the finest spacing.
+    pub fn step(self) -> u64 {
         match self {
             Self::Every { step } | Self::Spaced { step } | Self::Growing { step } => step,
         }

@@ -598,13 +598,8 @@ impl<C: StoppingCriterion> Session<C> {
 
     fn stop(&mut self, index: usize, reason: StopReason) -> Stop {
         let state = &mut self.tiles[index];
-        let stop = Stop {
-            tile: self.film.grid().tile(index),
-            spp: self.film.spp(index),
-            probability: state.verdict.and_then(|v| v.probability),
-            reason,
-            unfamiliar: state.verdict.is_some_and(|v| v.unfamiliar),
-        };
+        let stop = Stop::new(self.film.grid().tile(index), self.film.spp(index), reason);
+        let stop = state.verdict.map_or(stop, |verdict| stop.with_verdict(&verdict));
         *state.stop.insert(stop)
     }
 

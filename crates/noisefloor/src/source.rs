@@ -14,6 +14,7 @@ pub use identity::{IdentityChange, SourceIdentity};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Unit {
     /// Samples per pixel.
     SamplesPerPixel,
@@ -25,6 +26,7 @@ pub enum Unit {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Repeats {
     /// Every sample: it follows from (seed, pixel, index of the sample), however requests are cut and
     /// whatever other tiles are asked for with it. Only rounding of the means differs.
@@ -40,6 +42,7 @@ pub enum Repeats {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum PixelNoise {
     /// Yes: the noise of pixels is independent. Verdicts are made for this.
     #[default]
@@ -53,6 +56,7 @@ pub enum PixelNoise {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum Counts {
     /// As many as asked for; at its end what is left, and nothing from then on.
     Asked,
@@ -148,6 +152,7 @@ impl SourceInfo {
 
 /// A request for samples of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Request {
     /// The tile to sample.
     pub tile: Tile,
@@ -169,11 +174,19 @@ pub struct Request {
 /// sequence. The samples of a sequence then complete each other, and the halves stay independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[non_exhaustive]
 pub struct Sequence {
     /// Which sequence: that of half A is 0, that of half B is 1.
     pub number: u32,
     /// Samples per pixel that the sequence already has: the index of the first new point.
     pub first: u64,
+}
+
+impl Sequence {
+    /// A place in one of the sequences.
+    pub fn new(number: u32, first: u64) -> Self {
+        Self { number, first }
+    }
 }
 
 impl Request {
@@ -190,6 +203,7 @@ impl Request {
 
 /// New samples of one tile.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Batch {
     /// The tile that was sampled.
     pub tile: Tile,
@@ -201,8 +215,29 @@ pub struct Batch {
     pub mean: Vec<Rgb>,
 }
 
+impl Batch {
+    /// So many new samples per pixel of a tile, and their mean.
+    pub fn new(tile: Tile, spp: u64, mean: Vec<Rgb>) -> Self {
+        Self { tile, spp, mean }
+    }
+
+    /// Makes a batch for each request, black so far, in the memory of earlier ones: for
+    /// [`ProgressiveSource::sample_into`].
+    pub fn prepare(batches: &mut Vec<Self>, requests: &[Request]) {
+        batches.truncate(requests.len());
+        let more = &requests[batches.len()..];
+        batches.extend(more.iter().map(|request| Self::new(request.tile, request.spp, Vec::new())));
+        for (batch, &Request { tile, spp, .. }) in batches.iter_mut().zip(requests) {
+            (batch.tile, batch.spp) = (tile, spp);
+            batch.mean.clear();
+            batch.mean.resize(if spp == 0 { 0 } else { tile.pixels() }, [0.0; 3]);
+        }
+    }
+}
+
 /// A quick noise-free picture of the scene, the reference of Takouachet et al. 2017, §4.3.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Reference {
     /// Width in pixels, the same as the source's.
     pub width: usize,
@@ -212,8 +247,16 @@ pub struct Reference {
     pub pixels: Vec<Rgb>,
 }
 
+impl Reference {
+    /// A picture of this width and height.
+    pub fn new((width, height): (usize, usize), pixels: Vec<Rgb>) -> Self {
+        Self { width, height, pixels }
+    }
+}
+
 /// What camera rays meet first, also behind smooth glass and in mirrors, without any light: auxiliary pictures for denoisers.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FirstHits {
     /// Width in pixels, the same as the source's.
     pub width: usize,
@@ -227,8 +270,16 @@ pub struct FirstHits {
     pub normal: Vec<Rgb>,
 }
 
+impl FirstHits {
+    /// Pictures of this width and height.
+    pub fn new((width, height): (usize, usize), albedo: Vec<Rgb>, normal: Vec<Rgb>) -> Self {
+        Self { width, height, albedo, normal }
+    }
+}
+
 /// Why a source gave no samples.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SourceError {
     /// The renderer failed; the cause says how.
     #[error("{name}: sampling failed{}", .tile.map(|t| format!(" in tile {t}")).unwrap_or_default())]
@@ -291,6 +342,16 @@ pub trait ProgressiveSource {
     /// [`SourceError`] if the renderer failed; samples of this call are then lost, all earlier ones stay
     /// valid.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError>;
+
+    /// As [`ProgressiveSource::sample`], into batches that the caller keeps from call to call. The default calls `sample`; a
+    /// source that takes its memory from [`Batch::prepare`] allocates none for pixels.
+    ///
+    /// # Errors
+    /// As of [`ProgressiveSource::sample`].
+    fn sample_into(&mut self, requests: &[Request], batches: &mut Vec<Batch>) -> Result<(), SourceError> {
+        *batches = self.sample(requests)?;
+        Ok(())
+    }
 
     /// Renders the quick noise-free reference, if this source has one. Called at most once, and only if the
     /// criterion needs it.

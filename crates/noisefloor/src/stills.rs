@@ -30,6 +30,7 @@ const NOTABLE: f64 = 0.1;
 
 /// A picture with its samples per pixel.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Still {
     /// Width and height in pixels.
     pub size: (usize, usize),
@@ -47,6 +48,7 @@ pub struct Still {
 
 /// Why pictures cannot be compared.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum StillError {
     /// The samples per pixel are not a positive number.
     #[error("a positive number of samples per pixel is needed, not {0}")]
@@ -184,6 +186,23 @@ pub enum StillWarning {
 }
 
 impl Still {
+    /// Linear radiance in floating point, of which nobody knows where its samples come from.
+    pub fn new(size: (usize, usize), pixels: Vec<Rgb>, spp: f64) -> Self {
+        Self { size, pixels, spp, display_referred: false, rounding: 0.0, origin: None }
+    }
+
+    /// A picture that is displayed as it is, whose display values were rounded with this variance.
+    #[must_use]
+    pub fn displayed_as_it_is(self, rounding: f32) -> Self {
+        Self { display_referred: true, rounding, ..self }
+    }
+
+    /// The same with [`Still::origin`].
+    #[must_use]
+    pub fn with_origin(self, origin: Option<SampleOrigin>) -> Self {
+        Self { origin, ..self }
+    }
+
     /// Checks that there are as many pixels as the size says, that samples are positive and all pixels finite.
     ///
     /// # Errors

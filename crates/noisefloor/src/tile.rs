@@ -101,6 +101,7 @@ impl<'a> TilePixels<'a> {
 
 /// Why an image cannot be divided into such tiles.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TileError {
     /// The tile edge is outside [`MIN_TILE`]…[`MAX_TILE`].
     #[error("tile size {0} is outside {MIN_TILE}…{MAX_TILE} pixels; the default is {DEFAULT_TILE}")]

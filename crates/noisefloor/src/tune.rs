@@ -60,6 +60,7 @@ const WIDEST: f64 = 1e9;
 
 /// A setting of a renderer that trades time for noise, and its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Knob {
     /// Samples per pixel.
     Samples {
@@ -104,6 +105,14 @@ pub enum KnobError {
 }
 
 impl Knob {
+    /// `samples` or `threshold`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Samples { .. } => "samples",
+            Self::Threshold { .. } => "threshold",
+        }
+    }
+
     fn check(self) -> Result<(), KnobError> {
         match self {
             Self::Samples { least, most } if least < 2 || most / 2 < least.div_ceil(2) => {
@@ -178,6 +187,7 @@ fn three_digits(exact: f64) -> f64 {
 
 /// How far the mean of two pictures is from what may be seen, in its worst place.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Excess {
     /// What is wrong there over what may be wrong: 1 passes, 2 is twice as much. Not negative; infinite
     /// where it cannot be told.
@@ -197,6 +207,24 @@ impl Excess {
     pub fn new(ratio: f64) -> Self {
         let ratio = if ratio >= 0.0 { ratio } else { f64::INFINITY };
         Self { ratio, place: None, pictures: 0, alone: None }
+    }
+
+    /// The same with [`Excess::place`].
+    #[must_use]
+    pub fn at(self, place: Option<(usize, usize)>) -> Self {
+        Self { place, ..self }
+    }
+
+    /// The same with [`Excess::pictures`].
+    #[must_use]
+    pub fn of_pictures(self, pictures: u64) -> Self {
+        Self { pictures, ..self }
+    }
+
+    /// The same with [`Excess::alone`].
+    #[must_use]
+    pub fn with_alone(self, alone: Option<f64>) -> Self {
+        Self { alone, ..self }
     }
 
     /// Of each of the two pictures, at the most: noise that they do not share is smaller by √2 in their mean.
@@ -365,6 +393,7 @@ impl PicturePair {
 
 /// A setting that was tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Step {
     /// One picture with this setting would be as good as the mean of the two, if noise follows the setting.
     pub setting: f64,
@@ -383,6 +412,7 @@ impl Step {
 
 /// What to do next.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Next {
     /// Render two pictures with the same setting and different seeds, the same seeds in every step.
     Render {
@@ -397,6 +427,7 @@ pub enum Next {
 
 /// How a search ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Ending {
     /// One picture with the setting shows nothing that should not be seen.
     Found {
@@ -419,6 +450,18 @@ pub enum Ending {
         /// Over what may be seen.
         ratio: f64,
     },
+}
+
+impl Ending {
+    /// `found`, `at-finest`, `unchanged` or `not-falling`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Found { .. } => "found",
+            Self::AtFinest { .. } => "at-finest",
+            Self::Unchanged => "unchanged",
+            Self::NotFalling { .. } => "not-falling",
+        }
+    }
 }
 
 /// A search in progress.

@@ -172,6 +172,7 @@ impl fmt::Debug for Fault {
 /// How 8-bit numbers were turned into radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[non_exhaustive]
 pub enum Encoding {
     /// k/255, or k.
     Linear,

@@ -47,7 +47,7 @@ impl Shadow {
             }
             sum.map(|sum| sum / samples as f32)
         };
-        Batch { tile, spp: samples, mean: (0..tile.pixels()).map(pixel).collect() }
+        Batch::new(tile, samples, (0..tile.pixels()).map(pixel).collect())
     }
 
     /// Sample `n` of a pixel. All random numbers follow from (seed, pixel, n): the same picture whatever the

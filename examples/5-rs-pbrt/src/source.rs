@@ -71,7 +71,7 @@ impl Pbrt {
             sum.map(|c| (c / r.spp as f64) as f32)
         };
         let mean = (0..r.tile.pixels()).into_par_iter().map(pixel).collect();
-        Batch { tile: r.tile, spp: r.spp, mean }
+        Batch::new(r.tile, r.spp, mean)
     }
 
     /// Bidirectional path tracing of the whole picture. Paths from the lights meet the camera in any pixel,
@@ -171,7 +171,7 @@ impl ProgressiveSource for Pbrt {
                 let picture = self.trace_both(both, first, samples);
                 let cut =
                     |tile: Tile| tile.rows(self.size().0).flat_map(|row| picture[row].to_vec()).collect();
-                Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: samples, mean: cut(r.tile) }).collect())
+                Ok(requests.iter().map(|r| Batch::new(r.tile, samples, cut(r.tile))).collect())
             }
             _ => Ok(Vec::new()),
         }

@@ -36,7 +36,7 @@ impl ProgressiveSource for WholeFrames {
         (0..samples).for_each(|_| self.tracer.render(&mut buffer));
         let at = |pixel: usize| std::array::from_fn(|channel| buffer.pixels[4 * pixel + channel]);
         let cut = |r: &Request| r.tile.rows(self.width).flatten().map(at).collect();
-        Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: samples, mean: cut(r) }).collect())
+        Ok(requests.iter().map(|r| Batch::new(r.tile, samples, cut(r))).collect())
     }
 }
 

@@ -52,7 +52,7 @@ impl ProgressiveSource for Photons {
         let scale = 1.0 / (self.rays as f32 * samples as f32);
         let at = |pixel: usize| std::array::from_fn(|channel| sum[4 * pixel + channel] * scale);
         let cut = |r: &Request| r.tile.rows(self.width).flatten().map(at).collect();
-        Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: samples, mean: cut(r) }).collect())
+        Ok(requests.iter().map(|r| Batch::new(r.tile, samples, cut(r))).collect())
     }
 }
 

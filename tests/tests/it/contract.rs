@@ -45,7 +45,7 @@ fn noise_in_a_reference_is_noticed() {
                     let mut noise = Noise::new(seed);
                     let mut value = || 0.5 + 0.5 * deviation * 12f64.sqrt() * (noise.uniform() - 0.5);
                     let pixels = (0..SIZE.0 * SIZE.1).map(|_| [value() as f32; 3]).collect();
-                    Reference { width: SIZE.0, height: SIZE.1, pixels }
+                    Reference::new(SIZE, pixels)
                 };
                 Altered::reference(synthetic(), move || Some(image()))
             });
@@ -101,6 +101,11 @@ fn outcome(check: impl FnOnce()) -> String {
     text.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_default()
 }
 
+/// Other samples of the same tile.
+fn cut(request: &Request, first: u64, spp: u64) -> Request {
+    Request::new(request.tile, first, spp).in_sequence(request.sequence)
+}
+
 fn broken(change: impl FnMut(&[Request], &mut Vec<Batch>) + Copy + 'static) -> String {
     verdict(|| Altered::batches(synthetic(), change))
 }
@@ -118,7 +123,7 @@ fn broken_promises_are_noticed() {
 
     // The first samples over and over
     let again = |r: &[Request], b: &mut Vec<Batch>| {
-        let restart: Vec<_> = r.iter().map(|r| Request { first: 0, ..*r }).collect();
+        let restart: Vec<_> = r.iter().map(|r| cut(r, 0, r.spp)).collect();
         *b = synthetic().sample(&restart).unwrap();
     };
     let verdict_again = broken(again);
@@ -134,7 +139,8 @@ fn broken_promises_are_noticed() {
 
     // Random numbers numbered from the tile's corner
     let from_corner = |r: &[Request], b: &mut Vec<Batch>| {
-        let moved: Vec<_> = r.iter().map(|r| Request { tile: Tile { x: 0, y: 0, ..r.tile }, ..*r }).collect();
+        let moved: Vec<_> =
+            r.iter().map(|r| Request::new(Tile { x: 0, y: 0, ..r.tile }, r.first, r.spp)).collect();
         *b = synthetic().sample(&moved).unwrap();
         b.iter_mut().zip(r).for_each(|(b, r)| b.tile = r.tile);
     };
@@ -168,7 +174,7 @@ fn who_promises_less_is_held_to_less_and_no_less() {
     said(by_call(Repeats::Calls, dark), "the mean of 32 samples depends on how requests are cut");
     let few = |r: &Request, b: &mut Batch| {
         if r.spp == 8 {
-            let fewer = Request { spp: 4, first: 10_000 + r.first, ..*r };
+            let fewer = cut(r, 10_000 + r.first, 4);
             b.mean = synthetic().sample(&[fewer]).unwrap().remove(0).mean;
         }
     };
@@ -176,7 +182,7 @@ fn who_promises_less_is_held_to_less_and_no_less() {
     // Every other batch is the one before, which a renderer does that forgets to change its seed
     let twice = |r: &Request, b: &mut Batch| {
         let first = r.first / (2 * r.spp) * (2 * r.spp);
-        b.mean = synthetic().sample(&[Request { first, ..*r }]).unwrap().remove(0).mean;
+        b.mean = synthetic().sample(&[cut(r, first, r.spp)]).unwrap().remove(0).mean;
     };
     said(by_call(Repeats::Calls, twice), "correlated");
 }
@@ -186,8 +192,7 @@ fn late(counts: Counts, over: u64) -> String {
     verdict(move || {
         let source = Synthetic { counts, repeats: Repeats::Nothing, ..synthetic() };
         Altered::batches(source, move |requests, batches| {
-            let more =
-                |r: &Request| Request { spp: r.spp + over * ((r.first + r.tile.index as u64) % 7), ..*r };
+            let more = |r: &Request| cut(r, r.first, r.spp + over * ((r.first + r.tile.index as u64) % 7));
             *batches = synthetic().sample(&requests.iter().map(more).collect::<Vec<_>>()).unwrap();
         })
     })
@@ -258,7 +263,7 @@ impl ProgressiveSource for Running {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let all = |r: &Request| Request { first: 0, spp: r.first + 20, ..*r };
+        let all = |r: &Request| cut(r, 0, r.first + 20);
         let mut batches = self.source.sample(&requests.iter().map(all).collect::<Vec<_>>())?;
         batches.iter_mut().for_each(|b| b.spp = 20);
         Ok(batches)
@@ -272,7 +277,7 @@ fn playbacks_and_references_that_break_it_are_noticed() {
 
     let reference = |width: usize, value: f32| {
         verdict(move || {
-            let image = move || Reference { width, height: SIZE.1, pixels: vec![[value; 3]; width * SIZE.1] };
+            let image = move || Reference::new((width, SIZE.1), vec![[value; 3]; width * SIZE.1]);
             Altered::reference(synthetic(), move || Some(image()))
         })
     };
@@ -297,7 +302,7 @@ fn first_hits_that_break_it_are_noticed() {
                 let (width, height) = SIZE;
                 let albedo =
                     (0..(width * height) as u64).map(|pixel| [albedo(index, pixel) as f32; 3]).collect();
-                Some(FirstHits { width, height, albedo, normal: vec![[0.0, 0.6, 0.8]; width * height] })
+                Some(FirstHits::new((width, height), albedo, vec![[0.0, 0.6, 0.8]; width * height]))
             })
         })
     };
@@ -318,7 +323,7 @@ fn first_hits_that_break_it_are_noticed() {
     assert!(calls.contains("differ the second time"), "{calls}");
     let small = verdict(|| {
         let pixels = vec![[0.0; 3]; SIZE.0];
-        let hits = FirstHits { width: SIZE.0, height: 1, albedo: pixels.clone(), normal: pixels };
+        let hits = FirstHits::new((SIZE.0, 1), pixels.clone(), pixels);
         Altered::first_hits(synthetic(), move |_| Some(hits.clone()))
     });
     assert!(small.contains("image's size"), "{small}");

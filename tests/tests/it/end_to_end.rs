@@ -234,7 +234,7 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     };
     let source = Altered::reference(Synthetic::new(64, 32), move || {
         *count.borrow_mut() += 1;
-        Some(Reference { width: 64, height: 32, pixels: converged.clone() })
+        Some(Reference::new((64, 32), converged.clone()))
     });
     let outcome = run(source, oracle(), small_tiles());
     assert_eq!(*calls.borrow(), 1);

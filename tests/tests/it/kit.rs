@@ -89,7 +89,7 @@ impl ProgressiveSource for Synthetic {
             let pixels = if samples == 0 { 0 } else { r.tile.pixels() };
             let at = |i: usize| (r.tile.x + i % r.tile.width, r.tile.y + i / r.tile.width);
             let mean = (0..pixels).map(at).map(|(x, y)| self.mean(x, y, r.first, samples)).collect();
-            Batch { tile: r.tile, spp: samples, mean }
+            Batch::new(r.tile, samples, mean)
         };
         Ok(requests.iter().map(batch).collect())
     }

@@ -221,7 +221,7 @@ impl ProgressiveSource for Wall {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let batch = |r: &Request| Batch { tile: r.tile, spp: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] };
+        let batch = |r: &Request| Batch::new(r.tile, r.spp, vec![[0.2; 3]; r.tile.pixels()]);
         Ok(requests.iter().map(batch).collect())
     }
 }

@@ -5,7 +5,7 @@ use crate::fit::{familiarity, fit_groups, held_out, parts};
 use crate::params::{TrainError, TrainParams};
 use crate::predict::{Prediction, predict};
 use crate::score::score;
-use crate::svm::SvmParams;
+use noisefloor::svm::SvmParams;
 use noisefloor::{People, model::TrainingRecord};
 use rayon::prelude::*;
 use serde::Serialize;

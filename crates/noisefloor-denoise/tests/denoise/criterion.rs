@@ -1,14 +1,14 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
 use noisefloor::{
-    Audience, Film, Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, Tile,
-    TileGrid, ToneMapping, Viewing,
+    Film, Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, Tile, TileGrid,
+    ToneMapping, Verdict, Viewing,
     criterion::{CriterionError, View},
     display::Display,
     source::FirstHits,
 };
 use noisefloor_denoise::{
     AuxiliaryPictures, DenoiseError, DenoisePasses, DenoisedError, DenoisedQuality, Denoiser,
-    ESTIMATE_ERRS_BY, Guides, NoisyPicture, spp_with_denoising, spp_without_denoising,
+    ESTIMATE_ERRS_BY, Guides, NoisyPicture, compose, spp_with_denoising, spp_without_denoising,
 };
 use noisefloor_testkit::Noise;
 use noisefloor_vision::{VisionModel, VisionWorkspace};
@@ -70,12 +70,12 @@ fn a_plain_wall_is_done_sooner_when_denoised_and_a_smeared_one_is_not() {
     let record = record.lock().unwrap();
     assert_eq!(record.error.as_ref().unwrap().size(), SIZE);
     let allowed = 0.1 / ESTIMATE_ERRS_BY;
-    assert!(record.jods_lost.iter().all(|&lost| lost <= allowed), "{:?}", record.jods_lost);
-    assert_eq!([0, 2, 3, 5].map(|tile| record.undenoised[tile]), [true, false, true, false]);
+    let verdicts: Vec<Verdict> = (0..6).filter_map(|tile| denoised.verdict(tile)).collect();
+    assert!(verdicts.iter().all(|verdict| verdict.lost.unwrap() <= allowed), "{verdicts:?}");
+    assert_eq!([0, 2, 3, 5].map(|tile| verdicts[tile].undenoised), [true, false, true, false]);
     // They are shown as they were rendered
-    let grid = denoised.film().grid();
     let (rendered, mut shown) = (denoised.film().image(), vec![[0.0; 3]; SIZE.0 * SIZE.1]);
-    record.compose(grid, &rendered, &mut shown);
+    compose(&denoised, &rendered, &mut shown);
     assert!(shown[0] == rendered[0] && shown[SIZE.0 - 1] == [0.0; 3]);
     assert!(record.verdicts > 0 && record.seconds > 0.0);
 }
@@ -90,7 +90,7 @@ fn nineteen_of_twenty_tiles_that_stop_have_lost_no_more_than_is_allowed() {
         let display = session.display_so_far();
         let rendered = session.film().image();
         let mut denoised = Simple::Bilateral(0.1).of(&rendered);
-        session.criterion().record().lock().unwrap().compose(session.film().grid(), &rendered, &mut denoised);
+        compose(&session, &rendered, &mut denoised);
         let error = DenoisedError::known(SIZE, &denoised, &truth(), &display).unwrap();
         let (eyes, mut room) = (VisionModel::new(&session.params().viewing), VisionWorkspace::default());
         for stop in session.stops().filter(|stop| stop.reason == StopReason::Converged) {
@@ -120,8 +120,7 @@ fn squares_keep_the_limit_in_small_tiles_too() {
             }
             let rendered = session.film().image();
             let mut denoised = Simple::Bilateral(0.1).of(&rendered);
-            let record = session.criterion().record();
-            record.lock().unwrap().compose(session.film().grid(), &rendered, &mut denoised);
+            compose(&session, &rendered, &mut denoised);
             let error = DenoisedError::known(SIZE, &denoised, &truth(), &session.display_so_far()).unwrap();
             let (eyes, mut room) = (VisionModel::new(&session.params().viewing), VisionWorkspace::default());
             for square in noisefloor::TileGrid::new(SIZE.0, SIZE.1, 64).unwrap().tiles() {
@@ -283,7 +282,7 @@ fn halves_have_guides_of_their_own() {
     let hits = |albedo: f32| {
         let (width, height) = SIZE;
         let pixels = |value: f32| vec![[value; 3]; width * height];
-        FirstHits { width, height, albedo: pixels(albedo), normal: pixels(0.5) }
+        FirstHits::new((width, height), pixels(albedo), pixels(0.5))
     };
     let guided = plain.guided_by(Arc::new(Guides::new([hits(0.25), hits(0.75)])));
     assert_ne!(guided.fingerprint(), before);
@@ -299,10 +298,11 @@ fn halves_have_guides_of_their_own() {
 fn verdicts_know_what_the_mean_of_mirror_images_gains() {
     let judged = |passes| {
         let criterion = DenoisedQuality::new(Simple::Bilateral(0.3), 5.0).shown_as_mean_of(passes);
-        let (name, record) = (criterion.fingerprint(), criterion.record());
+        let name = criterion.fingerprint();
         let params = Params::default().with_tile(64).with_max_spp(64).with_min_spp(64);
-        run(&mut Session::new(SIZE.0, SIZE.1, criterion, params).unwrap()).unwrap();
-        let lost = record.lock().unwrap().jods_lost.clone();
+        let mut session = Session::new(SIZE.0, SIZE.1, criterion, params).unwrap();
+        run(&mut session).unwrap();
+        let lost: Vec<f64> = (0..6).map(|tile| session.verdict(tile).unwrap().lost.unwrap()).collect();
         (name, lost)
     };
     let ((one, alone), (four, mean)) = (judged(DenoisePasses::One), judged(DenoisePasses::Four));
@@ -356,33 +356,27 @@ fn few_open_tiles_are_judged_by_what_is_near() {
             film.add(tile.index, 8, &means).unwrap();
         }
     }
-    let view = View {
-        film: &film,
-        display: &Display::SRGB,
-        viewing: Viewing::default(),
-        audience: Audience::TRAINED,
-        reference: None,
-    };
+    let view = View::new(&film, &Display::SRGB);
     let judged = |tiles: &[Tile]| {
         let asked: Arc<Mutex<Vec<Vec<Tile>>>> = Arc::default();
         let mut criterion = DenoisedQuality::new(Parted(Simple::Bilateral(0.1), Arc::clone(&asked)), 0.1);
-        criterion.judge(&view, tiles).unwrap();
+        let verdicts = criterion.judge(&view, tiles).unwrap();
         let record = criterion.record();
         let record = record.lock().unwrap().clone();
         let pixels = |parts: &Vec<Tile>| parts.iter().map(|part| part.pixels()).sum();
         let asked: Vec<usize> = asked.lock().unwrap().iter().map(pixels).collect();
-        (asked, record)
+        (asked, record, verdicts)
     };
     let all = SIZE.0 * SIZE.1;
-    let (asked, whole) = judged(&tiles);
+    let (asked, whole, verdicts) = judged(&tiles);
     assert_eq!(asked, [all]);
     // In the corner, in the middle, and two that are far apart
     for (open, pixels) in [(vec![0], 96 * 96), (vec![79], 160 * 160), (vec![0, 139], 2 * 96 * 96)] {
         let open: Vec<Tile> = open.into_iter().map(|index| tiles[index]).collect();
-        let (asked, record) = judged(&open);
+        let (asked, record, of_open) = judged(&open);
         assert_eq!(asked, [pixels, all]);
-        for tile in &open {
-            let ratio = record.jods_lost[tile.index] / whole.jods_lost[tile.index];
+        for (tile, verdict) in open.iter().zip(of_open) {
+            let ratio = verdict.lost.unwrap() / verdicts[tile.index].lost.unwrap();
             assert!((ratio - 1.0).abs() < 0.05, "tile {}: x{ratio}", tile.index);
         }
         let [error, of_whole] = [&record, &whole].map(|record| record.error.as_ref().unwrap());
@@ -447,8 +441,8 @@ fn what_a_spoiled_denoiser_leaves_as_rendered_has_lost_no_more_than_is_allowed()
                 }
                 session.judge().unwrap();
             }
-            let record = session.criterion().record();
-            assert!(record.lock().unwrap().undenoised.iter().all(|undenoised| *undenoised), "{name}");
+            let all = session.film().grid().len();
+            assert!((0..all).all(|tile| session.verdict(tile).unwrap().undenoised), "{name}");
             let error =
                 DenoisedError::known(size, &session.film().image(), &truth, &session.display_so_far())
                     .unwrap();

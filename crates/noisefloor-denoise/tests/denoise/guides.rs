@@ -18,7 +18,7 @@ fn hits(seed: u64, deviation: f64, place: impl Fn(usize, usize) -> bool) -> Firs
         places.map(pixel).collect()
     };
     let (albedo, normal) = (plane(0.5), plane(0.0));
-    FirstHits { width, height, albedo, normal }
+    FirstHits::new((width, height), albedo, normal)
 }
 
 /// 0.02 in the noisiest square is the most: in squares of 1,750 pixels of six values, its estimate is right

@@ -89,7 +89,7 @@ fn it_cleans_albedo_and_normals() {
         plane.iter().map(|p| p.map(|c| c + 0.1 * noise.normal() as f32)).collect()
     };
     let (albedo, normal) = (noisy_of(&truth()), noisy_of(&curved));
-    let hits = FirstHits { width: SIZE.0, height: SIZE.1, albedo, normal };
+    let hits = FirstHits::new(SIZE, albedo, normal);
     let clean = oidn.prefilter(&hits).unwrap().unwrap();
     let off = |a: &[Rgb], b: &[Rgb]| -> f32 {
         let squares = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).powi(2));

@@ -24,7 +24,7 @@ impl ProgressiveSource for Wall {
     }
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-        let batch = |r: &Request| Batch { tile: r.tile, spp: r.spp, mean: self.mean(r) };
+        let batch = |r: &Request| Batch::new(r.tile, r.spp, self.mean(r));
         Ok(requests.iter().map(batch).collect())
     }
 }

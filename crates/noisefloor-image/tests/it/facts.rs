@@ -16,11 +16,8 @@ fn write(path: &Path, facts: &SampleFacts) {
 fn what_is_written_is_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    let origin = |source: &str, seed, repeats| SampleOrigin {
-        source: source.into(),
-        options: if repeats { "0123".into() } else { String::new() },
-        seed,
-        repeats,
+    let origin = |source: &str, seed, repeats| {
+        SampleOrigin::new(source, if repeats { "0123" } else { "" }, seed, repeats)
     };
     for facts in [
         SampleFacts { samples: Some((400, 400)), origin: Some(origin("hall by ptwne", u64::MAX, true)) },
@@ -79,7 +76,7 @@ fn samples_of_other_programs_are_read_and_nonsense_is_not() {
 fn a_comparison_takes_what_the_file_says_or_what_it_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    let origin = Some(SampleOrigin { source: "hall".into(), options: String::new(), seed: 1, repeats: true });
+    let origin = Some(SampleOrigin::new("hall", "", 1, true));
     write(&path, &SampleFacts { samples: Some((64, 64)), origin: origin.clone() });
     let still = read_still(&path, None).unwrap();
     assert_eq!((still.spp, still.origin), (64.0, origin));

@@ -17,7 +17,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
-use noisefloor::{Oracle, Viewing, viewing::ViewingParams};
+use noisefloor::{Oracle, Viewing};
 use noisefloor_eyes::{Person, SeenDisplay};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -249,8 +249,9 @@ async fn conditions(State(app): Shared, body: Body) -> Result<Json<PageView>, Re
 
 /// The default display, at the observer's pixels per degree.
 fn viewing(seen: &Conditions) -> Option<Viewing> {
-    let params = Viewing::default().params();
-    ViewingParams { pixels_per_degree: seen.pixels_per_degree(), ..params }.check().ok()
+    let mut params = Viewing::default().params();
+    params.pixels_per_degree = seen.pixels_per_degree();
+    params.check().ok()
 }
 
 #[derive(Deserialize)]

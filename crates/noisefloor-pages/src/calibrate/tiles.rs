@@ -127,14 +127,7 @@ impl CalibrationTile {
     }
 
     fn told(&self, oracle: &Oracle, viewing: Viewing, spp: f64, seed: u64) -> Option<f64> {
-        let still = |seed| Still {
-            size: (EDGE, EDGE),
-            pixels: self.rendered(spp, seed),
-            spp,
-            display_referred: true,
-            rounding: 0.0,
-            origin: None,
-        };
+        let still = |seed| Still::new((EDGE, EDGE), self.rendered(spp, seed), spp).displayed_as_it_is(0.0);
         let (one, other) = (still(seed), still(seed + 1));
         let pair = SnapshotPair::new(
             Evidence::Halves,

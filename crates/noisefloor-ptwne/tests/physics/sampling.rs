@@ -18,7 +18,7 @@ fn halves(scene: &Arc<noisefloor_ptwne::Scene>, seed: u64, sampling: Sampling, b
     // Uneven parts, as verdicts where they are due make them
     for spp in [8, 4, 20] {
         for (half, number) in [(0usize, 0), (1, b)] {
-            let sequence = Sequence { number, first: points[number as usize] };
+            let sequence = Sequence::new(number, points[number as usize]);
             let request = Request::new(tile, taken, spp).in_sequence(sequence);
             let mean: Vec<Rgb> = source.sample(&[request]).unwrap().remove(0).mean;
             sums[half].resize(mean.len(), 0.0);

@@ -13,7 +13,7 @@ fn samples_come_as_they_were_rendered() {
         let mut requests = requests(first, samples);
         requests.reverse();
         // A tile may be named twice
-        requests.push(Request { first: first + 50, ..requests[0] });
+        requests.push(Request::new(requests[0].tile, first + 50, requests[0].spp));
         let batches = source.sample(&requests).unwrap();
         assert_eq!(batches.len(), requests.len());
         for (request, batch) in requests.iter().zip(&batches) {

@@ -92,6 +92,7 @@ impl ColourLut {
 
 /// How linear radiance is encoded before a LUT.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum LutInput {
     /// Not at all: the LUT takes linear light, within its domain.
     #[default]

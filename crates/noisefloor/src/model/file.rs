@@ -68,18 +68,11 @@ impl TryFrom<StillViewing> for Viewing {
 
     fn try_from(still: StillViewing) -> Result<Self, ViewingError> {
         let StillViewing { pixels_per_degree, peak, black, ambient, reflectivity, eotf, primaries } = still;
-        let frames_per_second = None;
-        ViewingParams {
-            pixels_per_degree,
-            peak,
-            black,
-            ambient,
-            reflectivity,
-            eotf,
-            primaries,
-            frames_per_second,
-        }
-        .check()
+        let mut params = Viewing::default().params();
+        (params.pixels_per_degree, params.peak, params.black) = (pixels_per_degree, peak, black);
+        (params.ambient, params.reflectivity) = (ambient, reflectivity);
+        (params.eotf, params.primaries, params.frames_per_second) = (eotf, primaries, None);
+        params.check()
     }
 }
 

@@ -44,6 +44,7 @@ impl StopReason {
 
 /// Why a caller ends tiles that no criterion has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Interruption {
     /// The caller allows no more samples.
     MaxSpp,
@@ -86,6 +87,7 @@ impl fmt::Display for StopReason {
 /// A tile that is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[non_exhaustive]
 pub struct Stop {
     /// The tile.
     pub tile: Tile,
@@ -99,6 +101,18 @@ pub struct Stop {
     pub reason: StopReason,
     /// Whether the last verdict said that the tile is unlike anything the criterion was made for.
     pub unfamiliar: bool,
+}
+
+impl Stop {
+    /// A tile that nobody has judged.
+    pub fn new(tile: Tile, spp: u64, reason: StopReason) -> Self {
+        Self { tile, spp, probability: None, reason, unfamiliar: false }
+    }
+
+    /// The same with what the last verdict says.
+    pub fn with_verdict(self, verdict: &Verdict) -> Self {
+        Self { probability: verdict.probability, unfamiliar: verdict.unfamiliar, ..self }
+    }
 }
 
 /// Where a tile stands: open for its goal, or stopped. One that stopped at a limit has its goal still, for a session

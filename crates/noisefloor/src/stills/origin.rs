@@ -5,6 +5,7 @@ use crate::evidence::Samples;
 /// Where the samples of a picture come from. Files of the `noisefloor` command carry it, so that nobody has
 /// to say whether two of them share samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SampleOrigin {
     /// Scene and renderer.
     pub source: String,
@@ -31,6 +32,11 @@ pub enum OriginRelation {
 }
 
 impl SampleOrigin {
+    /// All that is known of them; `repeats` is [`SampleOrigin::repeats`].
+    pub fn new(source: impl Into<String>, options: impl Into<String>, seed: u64, repeats: bool) -> Self {
+        Self { source: source.into(), options: options.into(), seed, repeats }
+    }
+
     /// Whether two pictures share samples. Different seeds of one scene and renderer give independent ones,
     /// whatever the other options are.
     pub fn relation(&self, other: &Self) -> OriginRelation {

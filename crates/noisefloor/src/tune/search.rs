@@ -8,6 +8,7 @@ pub const CROP: usize = 128;
 
 /// A picture that two seeds are to be rendered of, and judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Look {
     /// What each of the two is rendered with.
     pub each: f64,

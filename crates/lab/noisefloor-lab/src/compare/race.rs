@@ -78,7 +78,7 @@ impl Entrant {
         let began = Instant::now();
         let batches = source.sample(&requests)?;
         self.own_seconds += began.elapsed().as_secs_f64();
-        for Batch { tile, spp, mean } in batches {
+        for Batch { tile, spp, mean, .. } in batches {
             if spp == 0 {
                 return Ok(false);
             }
@@ -256,7 +256,7 @@ impl Field {
         let asking = self.entrants.iter_mut().filter(|e| e.session.criterion().needs().reference);
         for entrant in asking {
             let (width, height) = grid.size();
-            entrant.session.set_reference(Reference { width, height, pixels: truth.to_vec() })?;
+            entrant.session.set_reference(Reference::new((width, height), truth.to_vec()))?;
         }
         Ok(())
     }
@@ -275,7 +275,7 @@ impl Field {
     fn step(&mut self, source: &mut dyn ProgressiveSource, samples: u64) -> Result<bool, LabError> {
         // As sessions ask for them: their halves in turn, each a sequence of its own
         let half = usize::from(self.points[1] < self.points[0]);
-        let sequence = Sequence { number: half as u32, first: self.points[half] };
+        let sequence = Sequence::new(half as u32, self.points[half]);
         let request = |tile: Tile| Request::new(tile, self.film.spp(0), samples).in_sequence(sequence);
         let requests: Vec<Request> = self.film.grid().tiles().map(request).collect();
         let batches = self.costs.sample(source, &requests)?;
@@ -283,7 +283,7 @@ impl Field {
             return Ok(false);
         }
         self.points[half] += samples;
-        for Batch { tile, spp: samples, mean } in &batches {
+        for Batch { tile, spp: samples, mean, .. } in &batches {
             self.film.add(tile.index, *samples, mean)?;
             let watching = |e: &&mut Entrant| !e.apart && e.session.is_open(tile.index);
             for entrant in self.entrants.iter_mut().filter(watching) {

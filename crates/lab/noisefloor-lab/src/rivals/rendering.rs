@@ -152,7 +152,7 @@ fn mosaic(tiles: &[&[Rgb]], edge: usize, columns: usize) -> Reference {
             pixels[start..start + row.len()].copy_from_slice(row);
         }
     }
-    Reference { width, height, pixels }
+    Reference::new((width, height), pixels)
 }
 
 #[cfg(test)]

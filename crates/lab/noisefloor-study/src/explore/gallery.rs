@@ -84,7 +84,7 @@ impl GalleryPicture {
             Some(_) => facts.spp().map(|spp| spp as f64),
             None => samples_in(&name),
         };
-        let still = Still { origin: facts.origin, ..picture.into_still(spp.unwrap_or(1.0)) };
+        let still = picture.into_still(spp.unwrap_or(1.0)).with_origin(facts.origin);
         still.check().map_err(|_| StudyError::NotFinite { path: path.to_owned() })?;
         let mut hash = blake3::Hasher::new();
         let mut file =

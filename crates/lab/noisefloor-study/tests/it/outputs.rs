@@ -51,8 +51,7 @@ impl ProgressiveSource for Wall {
 
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let mean = |r: &Request| r.first as f32 + 0.5 * (r.spp as f32 - 1.0);
-        let batch =
-            |r: &Request| Batch { tile: r.tile, spp: r.spp, mean: vec![[mean(r); 3]; r.tile.pixels()] };
+        let batch = |r: &Request| Batch::new(r.tile, r.spp, vec![[mean(r); 3]; r.tile.pixels()]);
         Ok(requests.iter().map(batch).collect())
     }
 }

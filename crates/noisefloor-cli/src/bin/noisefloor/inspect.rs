@@ -101,6 +101,7 @@ fn say_all(summary: &Summary<'_>) -> Result<(), NotSaid> {
             ToneMapping::Reinhard { key, white: Some(white) } =>
                 format!("Reinhard, key {key}, white {white}"),
             ToneMapping::ReinhardAt { exposure, .. } => format!("Reinhard, exposure {exposure}"),
+            other => format!("{other:?}"),
         }
     )?;
     let machine = match summary.support_vectors {

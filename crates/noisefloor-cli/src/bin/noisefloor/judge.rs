@@ -9,7 +9,6 @@ use anyhow::Context;
 use noisefloor::descriptor::Described;
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
-    criterion::ExpectedThreshold,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still, StillWarning},
 };
@@ -153,11 +152,7 @@ fn judge(
             height,
             probability,
             converged,
-            threshold: threshold.map(|t| ExpectedThreshold {
-                low: samples(t.low),
-                median: samples(t.median),
-                high: samples(t.high),
-            }),
+            threshold: threshold.map(|threshold| threshold.map(samples)),
             expected_spp: expected_spp.map(samples),
             unfamiliar,
             unlike,

@@ -149,7 +149,7 @@ impl Output {
             .reference
             .as_ref()
             .and_then(|reference| relative_mse(&session.film().image(), reference).ok());
-        let noisefloor::driver::TimelinePoint { seconds, samples, active_tiles } = progress.now;
+        let noisefloor::driver::TimelinePoint { seconds, samples, active_tiles, .. } = progress.now;
         let seconds = self.seconds_before + seconds;
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }
@@ -196,8 +196,7 @@ impl Output {
     ) -> anyhow::Result<()> {
         self.forget_earlier()?;
         let tiles = tiles::states(session);
-        let lost = self.denoised.as_ref().map(Denoised::jods_lost).unwrap_or_default();
-        write_csv(self.path("stops.csv"), tiles.iter().map(|tile| tile.row(&lost)))?;
+        write_csv(self.path("stops.csv"), tiles.iter().map(TileState::row))?;
         write_csv(self.path("timeline.csv"), self.timeline.iter())?;
         // The report goes before a checkpoint is removed: whatever is killed in between, one of them says
         // how far the render is. While a picture is missing, the render is not done, even if all tiles are

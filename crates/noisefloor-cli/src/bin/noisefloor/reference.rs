@@ -49,7 +49,7 @@ pub fn run(job: ReferenceJob) -> anyhow::Result<ExitCode> {
     cancel_on_signal(Arc::clone(&cancel), "stopping; nothing will be written")?;
     source.watch_reference(reference_bar(job.quiet), Arc::clone(&cancel));
     let start = Instant::now();
-    let Reference { width, height, pixels } = match source.reference() {
+    let Reference { width, height, pixels, .. } = match source.reference() {
         Err(error) if cancel.load(Ordering::Relaxed) => {
             note!("warning: nothing was written: {}", one_line(&error.into()));
             return Ok(ExitCode::from(INTERRUPTED));

@@ -9,7 +9,7 @@ use anyhow::bail;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{CROP, Ending, Excess, Knob, Look, Next, Search, Tuning};
+use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Tuning};
 use noisefloor::{Audience, Oracle, Params, ToneMapping, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::tone::Tone;
@@ -205,7 +205,7 @@ impl<'a> Tune<'a> {
     /// Renders and judges two pictures; the worst of all with this setting, where they were the last.
     fn look(&mut self, job: &TuneJob, look: Look) -> anyhow::Result<Option<Judged>> {
         let view = &mut self.views[look.view];
-        let mut what = format!("{} {}", name(job.tuning.knob()), look.setting);
+        let mut what = format!("{} {}", job.tuning.knob().name(), look.setting);
         if let Some(frame) = view.frame {
             what += &format!(", frame {frame}");
         }
@@ -278,15 +278,9 @@ impl<'a> Tune<'a> {
             Some(Ending::Found { setting, too_coarse }) => (Some(setting), too_coarse),
             _ => (None, None),
         };
-        let ending = match ending {
-            None => "searching",
-            Some(Ending::Found { .. }) => "found",
-            Some(Ending::AtFinest { .. }) => "at-finest",
-            Some(Ending::Unchanged) => "unchanged",
-            Some(Ending::NotFalling { .. }) => "not-falling",
-        };
+        let ending = ending.map_or("searching", |ending| ending.name());
         Report {
-            knob: name(self.search.tuning().knob()),
+            knob: self.search.tuning().knob().name(),
             setting,
             too_coarse,
             ending,
@@ -308,19 +302,12 @@ impl<'a> Tune<'a> {
 impl Row {
     fn excess(&self) -> Excess {
         let ratio = self.ratio.unwrap_or(f64::INFINITY);
-        Excess { place: self.x.zip(self.y), pictures: self.pictures, ..Excess::new(ratio) }
+        Excess::new(ratio).at(self.x.zip(self.y)).of_pictures(self.pictures)
     }
 }
 
 /// Edge of the tiles in which noise is described: windows are what is judged, whatever the tiles.
 const TILE: usize = 64;
-
-fn name(knob: Knob) -> &'static str {
-    match knob {
-        Knob::Samples { .. } => "samples",
-        Knob::Threshold { .. } => "threshold",
-    }
-}
 
 fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
     let what = match (&job.criterion, row.ratio) {
@@ -345,7 +332,7 @@ fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
     if row.crops > 0 {
         at += ", looked at in crops";
     }
-    let name = name(job.tuning.knob());
+    let name = job.tuning.knob().name();
     Ok(say!("{name} {}: {what}, at worst{at}; {:.1} s", row.setting, row.seconds + row.judging_seconds)?)
 }
 
@@ -358,7 +345,7 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
     {
         return Ok(say!("{setting}")?);
     }
-    let name = name(job.tuning.knob());
+    let name = job.tuning.knob().name();
     match ending {
         Ending::Found { setting, too_coarse: None } => {
             say!("{name} {setting}: the coarsest tried is enough; --from tries coarser ones")?
@@ -379,6 +366,7 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
             "error: more samples do not make it better ({ratio:.2} times too much): few samples may \
              find much of the light, a denoiser may have reached its limit, or the pictures share their random numbers"
         ),
+        other => note!("error: the search has ended: {}", other.name()),
     }
     if matches!(ending, Ending::Found { .. }) {
         let last: f64 = report.steps.last().map_or(0.0, |step| step.seconds);

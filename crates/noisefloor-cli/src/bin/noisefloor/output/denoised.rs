@@ -5,7 +5,7 @@ use super::Output;
 use noisefloor::{Rgb, Session, source::FirstHits};
 use noisefloor_cli::say::{NotSaid, note, say};
 use noisefloor_denoise::{
-    DenoisedRecord, Denoiser, ESTIMATE_ERRS_BY, Guides, NoisyPicture, spp_without_denoising,
+    DenoisedRecord, Denoiser, ESTIMATE_ERRS_BY, Guides, NoisyPicture, compose, spp_without_denoising,
 };
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
@@ -85,14 +85,10 @@ impl Denoised {
         self.record.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What each tile has lost by the last estimate; NaN, or nothing, before one.
-    pub(super) fn jods_lost(&self) -> Vec<f64> {
-        self.record().jods_lost.clone()
-    }
-
-    pub(super) fn report(&self) -> DenoisedReport {
+    pub(super) fn report(&self, session: &Session) -> DenoisedReport {
         let record = self.record();
-        let lost = record.jods_lost.iter().copied().filter(|lost| lost.is_finite());
+        let verdicts = || (0..session.film().grid().len()).filter_map(|tile| session.verdict(tile));
+        let lost = verdicts().filter_map(|verdict| verdict.lost).filter(|lost| lost.is_finite());
         DenoisedReport {
             denoiser: self.denoiser.name(),
             guided: self.guide.is_some(),
@@ -101,7 +97,7 @@ impl Denoised {
             seconds: record.seconds,
             picture_seconds: self.picture_seconds,
             jods_lost: lost.max_by(f64::total_cmp),
-            undenoised_tiles: record.undenoised.iter().filter(|&&undenoised| undenoised).count(),
+            undenoised_tiles: verdicts().filter(|verdict| verdict.undenoised).count(),
             spp_without: self.spp_without,
         }
     }
@@ -121,8 +117,7 @@ impl Output {
     /// Denoises the picture, and writes it with the map of its error.
     pub(super) fn write_denoised(&mut self, session: &Session) -> anyhow::Result<()> {
         let Some(denoised) = &mut self.denoised else { return Ok(()) };
-        let grid = session.film().grid();
-        let (width, height) = grid.size();
+        let (width, height) = session.film().grid().size();
         let began = Instant::now();
         let (noisy, wants) = (session.film().image(), denoised.denoiser.wants());
         let picture = NoisyPicture::new((width, height), &noisy);
@@ -131,7 +126,7 @@ impl Output {
             None => picture,
         };
         let mut image = denoised.denoiser.denoise(&picture)?;
-        denoised.record().compose(grid, &noisy, &mut image);
+        compose(session, &noisy, &mut image);
         let display = session.display_so_far();
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
         let viewing = session.params().viewing;
@@ -169,7 +164,7 @@ impl Output {
             jods_lost,
             undenoised_tiles,
             spp_without,
-        } = denoised.report();
+        } = denoised.report(session);
         let grid = session.film().grid();
         let spp = session.film().total_samples() as f64 / (grid.width() * grid.height()) as f64;
         let without = spp_without.map_or_else(

@@ -134,7 +134,7 @@ impl<'a> Report<'a> {
             seconds_oracle: clock.map(|c| c.criterion_seconds),
             seconds_total: clock.map(|c| c.total_seconds),
             rel_mse: output.timeline.last().and_then(|row| row.rel_mse),
-            denoised: output.denoised.as_ref().map(|denoised| denoised.report()),
+            denoised: output.denoised.as_ref().map(|denoised| denoised.report(session)),
         }
     }
 }

@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 pub(super) struct TileState {
     pub(super) stop: Stop,
     pub(super) open: bool,
+    /// What the denoised picture has lost there.
+    lost: Option<f64>,
 }
 
 /// One line of stops.csv.
@@ -30,19 +32,14 @@ pub(super) struct StopRow {
 /// All tiles, in their order.
 pub(super) fn states(session: &Session) -> Vec<TileState> {
     let stops: BTreeMap<usize, Stop> = session.stops().map(|s| (s.tile.index, s)).collect();
-    let state = |tile: Tile| match stops.get(&tile.index) {
-        Some(&stop) => TileState { stop, open: false },
-        None => {
-            let verdict = session.verdict(tile.index);
-            let stop = Stop {
-                tile,
-                spp: session.film().spp(tile.index),
-                probability: verdict.and_then(|v| v.probability),
-                reason: StopReason::Cancelled,
-                unfamiliar: verdict.is_some_and(|v| v.unfamiliar),
-            };
-            TileState { stop, open: true }
-        }
+    let state = |tile: Tile| {
+        let (stop, verdict) = (stops.get(&tile.index), session.verdict(tile.index));
+        let so_far = || {
+            let stop = Stop::new(tile, session.film().spp(tile.index), StopReason::Cancelled);
+            verdict.map_or(stop, |verdict| stop.with_verdict(&verdict))
+        };
+        let lost = verdict.and_then(|verdict| verdict.lost).filter(|lost| lost.is_finite());
+        TileState { stop: stop.copied().unwrap_or_else(so_far), open: stop.is_none(), lost }
     };
     session.film().grid().tiles().map(state).collect()
 }
@@ -59,12 +56,11 @@ impl TileState {
         !self.open && (reason.is_final() || reason == StopReason::SourceExhausted)
     }
 
-    /// A line of the table. `lost` has, for each tile, what the denoised picture has lost there.
-    pub(super) fn row(&self, lost: &[f64]) -> StopRow {
+    /// A line of the table.
+    pub(super) fn row(&self) -> StopRow {
         let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
         let (tile, reason) = (index, self.reason());
-        let jods_lost = lost.get(index).copied().filter(|lost| lost.is_finite());
-        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar, jods_lost }
+        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar, jods_lost: self.lost }
     }
 
     fn mark(&self) -> TileMark {

@@ -1,6 +1,6 @@
 //! Two pictures of a setting, and how far they are from what may be seen.
 
-use super::{TuneCriterion, TuneJob, name};
+use super::{TuneCriterion, TuneJob};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use noisefloor::display::Display;
@@ -133,7 +133,7 @@ impl View {
             TuneCriterion::Denoised { .. } => String::new(),
         };
         let tone = serde_json::to_string(&job.tone.absolute()?)?;
-        let (knob, said, most) = (name(job.tuning.knob()), judges.said(), job.most_spp.unwrap_or(0));
+        let (knob, said, most) = (job.tuning.knob().name(), judges.said(), job.most_spp.unwrap_or(0));
         let audience = serde_json::to_string(&job.audience)?;
         let seeds = seeds(self.source.seed);
         Ok(identity
@@ -333,7 +333,7 @@ impl<'a> Judges<'a> {
         // In the whole picture
         let in_whole = |excess: Excess| {
             let (x, y) = crop.map_or((0, 0), |crop| (crop.tile.x, crop.tile.y));
-            Excess { place: excess.place.map(|place| (place.0 + x, place.1 + y)), ..excess }
+            excess.at(excess.place.map(|place| (place.0 + x, place.1 + y)))
         };
         let halves = PicturePair::new(size, pictures.clone(), spp.unwrap_or(128.0));
         let halves = halves.map_err(|error| match error {
