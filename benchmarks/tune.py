@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Cycles' noise threshold: defaults, guesses, fixed samples, what Find Noise Threshold finds, and the add-on's own loop,
-for blender.md.
+for docs/benchmarks/blender.md.
 
     tune.py render ADDON.zip SCENE(.py|.blend) WIDTHxHEIGHT FOLDER [REFERENCE_SPP [SEEDS [DEVICE]]]   in an environment that has bpy
     tune.py measure FOLDER...                                                       pip install cvvdp pillow
