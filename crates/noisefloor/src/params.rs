@@ -18,18 +18,18 @@ pub enum Schedule {
         /// Samples per pixel between two verdicts, at least 2.
         step: u64,
     },
-    /// Spaced by the expected need: most of the way to where the criterion expects to be satisfied, at most
-    /// doubling what the tile has, in multiples of `step`. Where it expects
-    /// nothing, or is to say the same twice ([`Params::consecutive`]), after a quarter more. Tiles
-    /// stop as close to their need as with a verdict after every step, with a third of the verdicts.
+    /// Spaced by the expected need, in multiples of `step`. The next verdict comes three quarters of the way to where the
+    /// criterion expects to be satisfied, and at most at twice the samples. Without an expectation, or while verdicts have to be
+    /// repeated ([`Params::consecutive`]), it comes after a quarter more. Tiles stop as close to their need as with a
+    /// verdict after every step, with a third of the verdicts.
     Spaced {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
     },
-    /// After `step` samples per pixel, then where the criterion expects to be satisfied, after half as many more at
-    /// the least and as many at the most, in multiples of `step`: for criteria that take long however few tiles
-    /// they judge, such as those that denoise. Where few tiles are open, each gets more between two verdicts, up to
-    /// twice what it has: as many samples in all as `step` for each pixel of the picture.
+    /// Growing intervals, in multiples of `step`, for criteria whose verdicts take long however few tiles they judge, such as those
+    /// that denoise. The first verdict comes after `step` samples per pixel, each later one where the criterion expects to be
+    /// satisfied, but after at least half as many samples again, and at most twice as many in all. If few tiles are open, each
+    /// gets more between two verdicts, within these limits: in all, as many as `step` samples for each pixel of the picture.
     Growing {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
@@ -37,8 +37,8 @@ pub enum Schedule {
 }
 
 impl Default for Schedule {
-    /// Spaced, in steps of 8: a tile stops within a few percent of its need, where the paper's steps of 100
-    /// overshoot it by a fifth in ordinary scenes (docs/benchmarks/verdicts.md).
+    /// Spaced, in steps of 8. A tile stops within a few percent of its need; the paper's steps of 100 overshoot the need by a
+    /// fifth in ordinary scenes (docs/benchmarks/verdicts.md).
     fn default() -> Self {
         Self::Spaced { step: Self::STEP }
     }
@@ -100,8 +100,7 @@ impl Schedule {
     }
 }
 
-/// A straight line from the threshold of the observers in the training data to that of another audience: T′ =
-/// a·T + b.
+/// A straight line that maps the threshold T of the observers in the training data to that of another audience: T′ = a·T + b.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub struct Audience {
@@ -114,10 +113,10 @@ pub struct Audience {
 impl Audience {
     /// The observers of the training data: T′ = T.
     pub const TRAINED: Self = Self { slope: 1.0, offset: 0.0 };
-    /// Students of computer art, who ask for ×1.8 of what other students do. The paper gives a line, T′ = 1.94·T − 346,
-    /// r = 0.78 (Takouachet et al. 2017, §7.3), of thresholds of 1,441 to 6,631 samples of its own renderer, over which
-    /// it is between 1.70 and 1.89 times T; a renderer that needs fewer samples has the same people, and the line would
-    /// do nothing below 368. With that slope and offset, this is the paper's line itself.
+    /// Students of computer art, who ask for 1.8 times the samples of other students. The paper gives the line
+    /// T′ = 1.94·T − 346, r = 0.78 (Takouachet et al. 2017, §7.3), fitted to thresholds of 1,441 to 6,631 samples of its own
+    /// renderer. In that range it is 1.70 to 1.89 times T. Below 368 samples the line would have no effect, though
+    /// a renderer that needs fewer samples has the same viewers. For the paper's line itself, give that slope and offset.
     pub const ART_STUDENTS: Self = Self { slope: 1.8, offset: 0.0 };
 
     /// Combines this line with one that is relative to it.
@@ -161,28 +160,26 @@ impl Audience {
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub struct Params {
-    /// Tile edge in pixels, 16…512; see [`crate::TileGrid`] for the last column and row. A tile stops as a
-    /// whole. In a Cornell box of 256×256, tiles of 128, 64 and 32
-    /// pixels took 828, 801 and 698 independent samples per pixel, and the worst crop of 64×64 had lost 0.65, 0.47 and 0.50 JOD
-    /// (`docs/benchmarks/tiles.md`). People judged zones of 128 and 200 pixels; below 64 the model knows less.
+    /// Tile edge in pixels, 16…512; see [`crate::TileGrid`] for the last column and row. A tile stops as a whole. Smaller tiles
+    /// take fewer samples (`docs/benchmarks/tiles.md`). People judged zones of 128 and 200 pixels; below 64 the model knows
+    /// less.
     pub tile: usize,
     /// How radiance is displayed.
     pub tone_mapping: ToneMapping,
-    /// On which display the picture is seen, and from how far, as a still or as a frame of a film
-    /// ([`Viewing::frames_per_second`]); checked by its type. The default is what the training data are taken to
-    /// have been seen on: see [`crate::Model::viewing`].
+    /// The display and its distance, and whether the picture is a still or a frame of a film
+    /// ([`Viewing::frames_per_second`]). The default is the display assumed for the training data: see
+    /// [`crate::Model::viewing`].
     pub viewing: Viewing,
     /// When tiles are judged.
     pub schedule: Schedule,
-    /// Fewest samples per pixel at which a tile may stop. Below 100, the oracle stops only tiles whose noise is
-    /// spread over many pixels, in pictures of two million samples. More find more of the light that is seldom found.
+    /// Fewest samples per pixel at which a tile may stop. A larger number finds more of the light that is seldom found. Below
+    /// 100, the oracle stops a tile only if its noise is spread over many pixels and the picture has two million samples.
     pub min_spp: u64,
     /// Samples per pixel at which every tile stops (Takouachet et al. 2017, §4.2.1: 10,000).
     pub max_spp: u64,
     /// Consecutive "converged" verdicts that stop a tile, at least 1.
     pub consecutive: u32,
-    /// Whose thresholds, relative to those that the criterion stands for
-    /// ([`crate::StoppingCriterion::audience`]).
+    /// The viewers, relative to those that the criterion stands for ([`crate::StoppingCriterion::audience`]).
     pub audience: Audience,
 }
 

@@ -23,7 +23,7 @@
 
 mod search;
 
-pub use search::{CROP, Look, Search, crops_for};
+pub use search::{CROP, Look, Search, Viewer, crops_for, drive};
 
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::film::{Film, blend_row};
@@ -35,27 +35,28 @@ use crate::tile::{Tile, TileError, TileGrid, TilePixels};
 use std::f64::consts::SQRT_2;
 use thiserror::Error;
 
-/// What is aimed at, as a share of what may be seen: an estimate that is a tenth too high does not cost another step.
+/// The target, as a share of what may be seen. The margin saves a step where an estimate is a tenth too high.
 const AIM: f64 = 0.9;
-/// log(excess) over log(effort), until two steps have shown it: noise falls with the root of the samples.
+/// The slope of log(excess) over log(effort), assumed until two steps have measured it: noise falls with the root of the samples.
 const NOISE: f64 = 0.5;
-/// Slopes that are believed. What denoisers leave falls by 0.3 to 0.7 (`docs/denoising.md`); where pixels have the fewest samples
-/// that a renderer takes, nothing falls at first.
+/// Measured slopes are clamped to this range. The error of denoised pictures falls with slopes of 0.3 to 0.7
+/// (`docs/denoising.md`). While all pixels have the fewest samples that the renderer takes, it does not fall.
 const SLOPES: (f64, f64) = (0.2, 1.0);
-/// A step makes at least this many times the effort, and at most [`LEAP`]: a coarse picture does not know the light that it has not
-/// met, and a step too far is paid for twice.
+/// A step multiplies the effort by at least this factor and at most [`LEAP`]. A coarse picture says nothing of light that it
+/// has not met, and a step too far is paid for twice.
 const LEAST_STEP: f64 = 1.25;
 const LEAP: f64 = 16.0;
-/// One picture has this much more left than the mean of two coarser ones, of √2: about all pixels still have the fewest samples that
-/// the renderer takes. Finer thresholds cost next to nothing before some have more, so that a step makes at least [`BLIND`] times the
-/// effort.
+/// If one picture has at least this share of √2 times what the mean of two coarser ones has left, nearly all pixels still have
+/// the fewest samples that the renderer takes. Finer thresholds cost next to nothing until some pixels have more, so a step
+/// then multiplies the effort by at least [`BLIND`].
 const STILL: f64 = 0.97;
 const BLIND: f64 = 8.0;
-/// Less than this left, as a share of what may be seen, is a step too far: a setting in between is looked at, once.
+/// A step that leaves less than this share of what may be seen went too far: one setting in between is tried.
 const LOOSE: f64 = 0.65;
-/// Below this slope, twice in a row, more samples do not help: twice the effort takes less than 4 % of what is wrong.
+/// After two slopes in a row below this one, more samples are taken to be of no use: doubling the effort removes less than 4 %
+/// of what is wrong.
 const FLAT: f64 = 0.06;
-/// A renderer has no more use for a range of thresholds: it takes 10¹⁸ times the samples at its end.
+/// The widest range of thresholds that is searched: its end takes 10¹⁸ times the samples of its beginning.
 const WIDEST: f64 = 1e9;
 
 /// A setting of a renderer that trades time for noise, and its range.
@@ -79,7 +80,7 @@ pub enum Knob {
     },
 }
 
-/// A range that cannot be searched.
+/// Why a range cannot be searched.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum KnobError {
@@ -130,7 +131,7 @@ impl Knob {
         }
     }
 
-    /// What each of two pictures is rendered with, if their mean is to be as good as one with `setting`.
+    /// The setting of each of two pictures whose mean is as good as one picture with `setting`.
     pub fn of_each(self, setting: f64) -> f64 {
         match self {
             Self::Samples { .. } => (setting / 2.0).ceil(),
@@ -138,7 +139,7 @@ impl Knob {
         }
     }
 
-    /// What one picture is rendered with that is as good as the mean of two, if noise follows the setting.
+    /// The setting of one picture that is as good as the mean of two, if noise follows the setting.
     fn of_both(self, each: f64) -> f64 {
         match self {
             Self::Samples { .. } => each * 2.0,
@@ -146,7 +147,7 @@ impl Knob {
         }
     }
 
-    /// The samples that pictures with this setting take, in any unit; their logarithm.
+    /// The logarithm of the samples that pictures with this setting take, in any unit.
     fn effort(self, each: f64) -> f64 {
         match self {
             Self::Samples { .. } => each.ln(),
@@ -171,7 +172,7 @@ impl Knob {
         }
     }
 
-    /// What the last two are rendered with: one of them, if it is a threshold, is to be enough alone.
+    /// What the last two are rendered with. With a threshold, one of them is to be enough alone.
     fn finest(self) -> f64 {
         match self {
             Self::Samples { most, .. } => (most / 2) as f64,
@@ -180,25 +181,25 @@ impl Knob {
     }
 }
 
-/// Rounded to the nearest: within 1 % of the effort. As text, since a product of decimal digits is no decimal number.
+/// Rounds to three digits, which changes the effort by at most 1 %. By way of text, which gives the decimal number that people type.
 fn three_digits(exact: f64) -> f64 {
     format!("{exact:.2e}").parse().unwrap_or(exact)
 }
 
-/// How far the mean of two pictures is from what may be seen, in its worst place.
+/// How far the mean of two pictures is from what may be seen, in the worst place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Excess {
-    /// What is wrong there over what may be wrong: 1 passes, 2 is twice as much. Not negative; infinite
-    /// where it cannot be told.
+    /// The ratio of what is seen there to what may be seen: 1 passes, 2 is twice too much. At least 0; infinite where it is
+    /// unknown.
     pub ratio: f64,
     /// The worst pixel, as x and y; `None` if nobody asked where.
     pub place: Option<(usize, usize)>,
-    /// A number that follows from the pictures, the same for the same pictures; 0 if it is not known.
+    /// A number computed from the pictures, equal for equal pictures; 0 if unknown.
     pub pictures: u64,
-    /// The same ratio of *one* picture whose threshold is finer by √2, so that its noise is that of the mean where it follows the
-    /// threshold: `ratio` there, and √2 times as much where every pixel has the fewest samples that the renderer takes. `None` if
-    /// it is not known how the samples of pixels follow: then only pictures that were rendered speak for a setting.
+    /// The ratio expected of *one* picture whose threshold is finer by √2. Where noise follows the threshold, that picture is as
+    /// good as the mean of two, and this is `ratio`; where every pixel has the fewest samples that the renderer takes, it is √2
+    /// times `ratio`. `None` if it is unknown how samples follow the threshold: then only rendered pictures count.
     pub alone: Option<f64>,
 }
 
@@ -442,10 +443,11 @@ pub enum Ending {
         /// Over what may be seen.
         ratio: f64,
     },
-    /// All settings down to the finest gave the same pictures: the renderer ignores the setting, or has reached another limit, such
-    /// as its most samples, or the fewest that it takes.
+    /// All settings down to the finest gave the same pictures. The renderer ignores the setting, or is held by another limit, such
+    /// as its most or its fewest samples.
     Unchanged,
-    /// More effort does not make less noise: what is wrong is no noise, few samples find the light, or the pictures are not independent.
+    /// More effort does not reduce what is seen: it is no noise, few samples find the light, or the pictures are not
+    /// independent.
     NotFalling {
         /// Over what may be seen.
         ratio: f64,
@@ -466,9 +468,9 @@ impl Ending {
 
 /// A search in progress.
 ///
-/// From the coarsest setting on, each step goes where the line through the last two meets what may be seen, in logarithms of what
-/// is wrong and of the effort; the first one goes where noise would. After a step too far, one in between is looked at. What is
-/// claimed has been looked at.
+/// The search begins with the coarsest setting. Each step draws a line through the last two, in logarithms of excess and effort, and
+/// goes to where the line meets what may be seen; the first step assumes that noise falls as 1/√n. After a step too far, it
+/// tries one setting in between. It claims only what it has looked at.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuning {
     knob: Knob,

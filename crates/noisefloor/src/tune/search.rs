@@ -18,9 +18,67 @@ pub struct Look {
     pub view: usize,
     /// A part of it, to be judged as a picture of its own; `None` for the whole.
     pub crop: Option<Tile>,
-    /// Nothing is rendered: the part is cut from the pictures of the whole view that were rendered with this setting, just
-    /// before.
+    /// Whether nothing is to be rendered: the crop is cut from the pictures of the whole view that were rendered just before,
+    /// with the same setting.
     pub is_rendered: bool,
+}
+
+/// Renders and judges the pictures that a search asks for. A closure that looks is one.
+pub trait Viewer {
+    /// Why pictures cannot be rendered or judged.
+    type Error;
+
+    /// Renders two pictures with [`Look::each`], each with a seed of its own and the same seeds in every step. Returns what was
+    /// found in the worst place, and in the [`squares`](super::squares) of the picture if crops are wanted.
+    ///
+    /// # Errors
+    /// They end the search.
+    fn look(&mut self, look: &Look) -> Result<(Excess, Vec<(Tile, f64)>), Self::Error>;
+
+    /// All looks with one setting are done, for now.
+    ///
+    /// # Errors
+    /// They end the search.
+    fn step(&mut self, _search: &Search) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
+
+impl<E, F: FnMut(&Look) -> Result<(Excess, Vec<(Tile, f64)>), E>> Viewer for F {
+    type Error = E;
+
+    fn look(&mut self, look: &Look) -> Result<(Excess, Vec<(Tile, f64)>), E> {
+        self(look)
+    }
+}
+
+/// Runs a search to its end.
+///
+/// ```
+/// use noisefloor::tune::{Ending, Excess, Knob, Look, Search, Tuning, drive};
+///
+/// let tuning = Tuning::new(Knob::Threshold { coarsest: 0.1, finest: 0.001 })?;
+/// let mut search = Search::new(tuning, 1, 0);
+/// // A renderer whose noise is seen as soon as its threshold is above 0.03
+/// let mut look = |look: &Look| Ok::<_, std::io::Error>((Excess::new(look.setting / 0.03), Vec::new()));
+/// let ending = drive(&mut search, &mut look)?;
+/// assert!(matches!(ending, Ending::Found { setting, .. } if setting <= 0.03));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// Those of `viewer`. The search can go on afterwards.
+pub fn drive<V: Viewer + ?Sized>(search: &mut Search, viewer: &mut V) -> Result<Ending, V::Error> {
+    while let Some(look) = search.next() {
+        let (excess, squares) = viewer.look(&look)?;
+        if search.tell(excess, &squares) {
+            viewer.step(search)?;
+        }
+    }
+    match search.tuning().next() {
+        Next::Done(ending) => Ok(ending),
+        Next::Render { .. } => unreachable!("a search that asks for nothing has ended"),
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,10 +107,11 @@ enum Purpose {
     Again,
 }
 
-/// A [`Tuning`] over one or several views. With the first setting, all of them are looked at as a whole; with the next ones
-/// only until one fails, in the order in which they were hard. Of large views, crops around the worst squares may
-/// stand for the whole: the setting that is enough for them is tried on the whole in the end, and if that is not so, the search
-/// goes on in other crops.
+/// A [`Tuning`] over one or several views.
+///
+/// With the first setting, the search looks at all views as a whole. With later settings, it begins with the hardest view and
+/// stops at the first one that fails. In large views, crops around the worst squares can stand for the whole. The setting that is
+/// enough for the crops is then tried on the whole view; if it fails there, the search goes on in other crops.
 ///
 /// ```
 /// use noisefloor::tune::{Ending, Excess, Knob, Next, Search, Tuning};
@@ -84,8 +143,8 @@ pub struct Search {
 }
 
 impl Search {
-    /// A search over so many views, of which so many crops stand for the whole; 0 for none. A tuning that has steps goes on from
-    /// there.
+    /// A search over this number of `views`, for which at most this number of `crops` stand; 0 for none. A tuning that has
+    /// steps is continued.
     pub fn new(tuning: Tuning, views: usize, crops: usize) -> Self {
         let purpose = if tuning.steps().is_empty() { Purpose::First } else { Purpose::Step };
         let views: Vec<usize> = (0..views.max(1)).collect();
@@ -93,7 +152,7 @@ impl Search {
         Self { tuning, crops, purpose, places, seen: Vec::new(), views, stood: Vec::new() }.ordered(&[])
     }
 
-    /// With these views first, hardest first, as an earlier search has found.
+    /// The same with these views first, in this order: hardest first, as found by an earlier search.
     #[must_use]
     pub fn ordered(mut self, hardest: &[usize]) -> Self {
         self.views = first(hardest.iter().copied().filter(|view| self.views.contains(view)), &self.views);
@@ -111,7 +170,7 @@ impl Search {
         &self.views
     }
 
-    /// The crops that have stood for whole views, the last of them, hardest first: view and place.
+    /// The latest crops that have stood for whole views, hardest first: view and place.
     pub fn crops(&self) -> &[(usize, Tile)] {
         &self.stood
     }
@@ -132,8 +191,9 @@ impl Search {
         Some(Look { each, setting, view, crop, is_rendered })
     }
 
-    /// What was found there: in the worst place, and in [`squares`](super::squares) of the picture, as far as crops are
-    /// wanted. Returns whether that was the last look with this setting, for now; at the end, nothing happens.
+    /// Reports the look that [`Search::next`] asked for: the worst place, and, if crops are wanted, all
+    /// [`squares`](super::squares) of the picture. Returns whether it was the last look with this setting, for now. After the
+    /// end, nothing happens.
     pub fn tell(&mut self, excess: Excess, squares: &[(Tile, f64)]) -> bool {
         let Some(look) = self.next() else { return true };
         let place = Place { view: look.view, crop: look.crop };

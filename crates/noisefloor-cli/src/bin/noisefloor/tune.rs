@@ -3,14 +3,13 @@
 mod keep;
 mod pictures;
 
-use crate::tune::keep::Keep;
+use crate::tune::keep::{Keep, KeptSearch};
 use crate::tune::pictures::{Crop, Judged, Judges, Pair, View};
-use anyhow::bail;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Tuning};
-use noisefloor::{Audience, Oracle, Params, ToneMapping, Viewing};
+use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Tuning, Viewer, drive};
+use noisefloor::{Audience, Oracle, Params, Tile, ToneMapping, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::{note, say, say_json};
@@ -111,24 +110,14 @@ pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
         None => "stopped; what was found so far stands above",
     })?;
     let keep = job.keep.take().map(|folder| Keep::claim(folder, job.earlier)).transpose()?;
-    let mut tune = Tune::begin(&job)?;
-    if let (Some(keep), Earlier::Resume) = (&keep, job.earlier) {
-        tune.resume(keep, &job)?;
-    }
-    while let Some(look) = tune.search.next() {
-        let Some(judged) = tune.look(&job, look)? else { continue };
-        let row = &tune.rows[tune.rows.len() - 1];
-        if !job.quiet && !job.json {
-            say_step(&job, row)?;
-        }
-        if let Some(keep) = &keep {
-            keep.write_pictures(&judged)?;
-            keep.write_report(&tune.report(None))?;
-        }
-    }
-    let Next::Done(ending) = tune.search.tuning().next() else { bail!("the search has not ended") };
-    let report = tune.report(Some(ending));
-    if let Some(keep) = &keep {
+    let mut tune = Tune::begin(&job, keep)?;
+    let mut search = match (&tune.keep, job.earlier) {
+        (Some(keep), Earlier::Resume) => tune.resume(keep.earlier(&tune.identity)?)?,
+        _ => Search::new(job.tuning.clone(), tune.views.len(), job.regions),
+    };
+    let ending = drive(&mut search, &mut tune)?;
+    let report = tune.report(&search, Some(ending));
+    if let Some(keep) = &tune.keep {
         keep.write_report(&report)?;
     }
     say_all(&job, &report, ending)?;
@@ -136,9 +125,10 @@ pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
     Ok(if matches!(ending, Ending::Found { .. }) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// A search in progress.
+/// What a search looks at.
 struct Tune<'a> {
-    search: Search,
+    job: &'a TuneJob,
+    keep: Option<Keep>,
     /// One, or the frames of a sequence.
     views: Vec<View>,
     /// How each is displayed, once it was seen.
@@ -155,7 +145,7 @@ struct Tune<'a> {
 }
 
 impl<'a> Tune<'a> {
-    fn begin(job: &'a TuneJob) -> anyhow::Result<Self> {
+    fn begin(job: &'a TuneJob, keep: Option<Keep>) -> anyhow::Result<Self> {
         let mut params = Params::default().with_viewing(job.viewing).with_tile(TILE);
         (params.tone_mapping, params.audience) = (job.tone.load()?, job.audience);
         let mut judges = Judges::begin(&job.criterion, params, job.resources.timeout)?;
@@ -166,9 +156,9 @@ impl<'a> Tune<'a> {
         let views = frames.into_iter().map(|frame| View::open(job, frame, &mut judges));
         let views: Vec<View> = views.collect::<anyhow::Result<_>>()?;
         let identity: anyhow::Result<_> = views.iter().map(|view| view.identity(job, &judges)).collect();
-        let search = Search::new(job.tuning.clone(), views.len(), job.regions);
         Ok(Self {
-            search,
+            job,
+            keep,
             identity: identity?,
             tones: vec![None; views.len()],
             views,
@@ -181,11 +171,12 @@ impl<'a> Tune<'a> {
         })
     }
 
-    /// Takes over what an earlier search has found.
-    fn resume(&mut self, keep: &Keep, job: &TuneJob) -> anyhow::Result<()> {
-        let Some(kept) = keep.earlier(&self.identity)? else { return Ok(()) };
+    /// A search that takes over what an earlier one has found.
+    fn resume(&mut self, kept: Option<KeptSearch>) -> anyhow::Result<Search> {
+        let job = self.job;
+        let (steps, frames) = kept.map(|kept| (kept.steps, kept.frames)).unwrap_or_default();
         let mut tuning = job.tuning.clone();
-        for row in kept.steps {
+        for row in steps {
             // With another --from or --to, the search may go another way from some step on
             if !matches!(tuning.next(), Next::Render { setting, .. } if setting == row.setting) {
                 break;
@@ -197,13 +188,16 @@ impl<'a> Tune<'a> {
             self.rows.push(row);
         }
         let number = |frame: &i32| self.views.iter().position(|view| view.frame == Some(*frame));
-        let hardest: Vec<usize> = kept.frames.iter().filter_map(number).collect();
-        self.search = Search::new(tuning, self.views.len(), job.regions).ordered(&hardest);
-        Ok(())
+        let hardest: Vec<usize> = frames.iter().filter_map(number).collect();
+        Ok(Search::new(tuning, self.views.len(), job.regions).ordered(&hardest))
     }
+}
 
-    /// Renders and judges two pictures; the worst of all with this setting, where they were the last.
-    fn look(&mut self, job: &TuneJob, look: Look) -> anyhow::Result<Option<Judged>> {
+impl Viewer for Tune<'_> {
+    type Error = anyhow::Error;
+
+    fn look(&mut self, look: &Look) -> anyhow::Result<(Excess, Vec<(Tile, f64)>)> {
+        let job = self.job;
         let view = &mut self.views[look.view];
         let mut what = format!("{} {}", job.tuning.knob().name(), look.setting);
         if let Some(frame) = view.frame {
@@ -239,19 +233,21 @@ impl<'a> Tune<'a> {
             self.whole.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
             self.whole.truncate(job.regions);
         }
-        let done = self.search.tell(judged.excess, &judged.squares);
+        let found = (judged.excess, judged.squares.clone());
         let worse = |worst: &(Look, Judged)| judged.excess.ratio > worst.1.excess.ratio;
         // Crops of whole pictures are another look at the same
         if !look.is_rendered && self.worst.as_ref().is_none_or(worse) {
-            self.worst = Some((look, judged));
+            self.worst = Some((*look, judged));
         }
-        if !done {
-            return Ok(None);
-        }
+        Ok(found)
+    }
+
+    fn step(&mut self, search: &Search) -> anyhow::Result<()> {
+        let job = self.job;
         self.whole.clear();
-        let Some((look, judged)) = self.worst.take() else { return Ok(None) };
+        let Some((look, judged)) = self.worst.take() else { return Ok(()) };
         // The last look at the whole, after crops, is no step of the search if it passes
-        let step = self.search.tuning().steps().last().filter(|step| step.each == look.each);
+        let step = search.tuning().steps().last().filter(|step| step.each == look.each);
         let told = step.map_or(judged.excess, |step| step.excess);
         self.rows.push(Row {
             setting: look.setting,
@@ -265,29 +261,37 @@ impl<'a> Tune<'a> {
             seconds: std::mem::take(&mut self.rendering).as_secs_f64(),
             judging_seconds: std::mem::take(&mut self.judging).as_secs_f64(),
         });
-        Ok(Some(judged))
+        if !job.quiet && !job.json {
+            say_step(job, &self.rows[self.rows.len() - 1])?;
+        }
+        if let Some(keep) = &self.keep {
+            keep.write_pictures(&judged)?;
+            keep.write_report(&self.report(search, None))?;
+        }
+        Ok(())
     }
+}
 
+impl Tune<'_> {
     /// Those of a sequence, worst first.
-    fn frames(&self) -> Vec<i32> {
-        self.search.views().iter().filter_map(|&view| self.views[view].frame).collect()
+    fn frames(&self, search: &Search) -> Vec<i32> {
+        search.views().iter().filter_map(|&view| self.views[view].frame).collect()
     }
 
-    fn report(&self, ending: Option<Ending>) -> Report {
+    fn report(&self, search: &Search, ending: Option<Ending>) -> Report {
         let (setting, too_coarse) = match ending {
             Some(Ending::Found { setting, too_coarse }) => (Some(setting), too_coarse),
             _ => (None, None),
         };
         let ending = ending.map_or("searching", |ending| ending.name());
         Report {
-            knob: self.search.tuning().knob().name(),
+            knob: search.tuning().knob().name(),
             setting,
             too_coarse,
             ending,
             judged: self.judges.said(),
-            frames: self.frames(),
-            regions: self
-                .search
+            frames: self.frames(search),
+            regions: search
                 .crops()
                 .iter()
                 .map(|(_, crop)| [crop.x, crop.y, crop.width, crop.height])
