@@ -52,8 +52,8 @@ impl Folder {
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => bail!(
-                "{}: another noisefloor is writing into this folder; wait for it, or choose another with \
-                 --out",
+                "{}: another noisefloor is writing into this folder; wait for it, \
+                 or choose another with --out",
                 path.display()
             ),
             // File systems without locks are rare, and no reason not to render

@@ -259,9 +259,9 @@ impl SourceJob {
             (Some(scene), None) if in_values || self.holds_all_frames() => Ok(scene.with_extension("")),
             (None, None) if in_values => Ok(PathBuf::new()),
             (Some(scene), None) => refuse!(
-                "--frames: '{}' does not say where the number of the frame stands: write {{frame}} or {{frame:04}} \
-                 there, once (####, %04d and $F4 do, too), or into a value of --define. One .blend file holds all \
-                 frames, with --source cycles",
+                "--frames: '{}' does not say where the number of the frame stands: \
+                 write {{frame}} or {{frame:04}} there, once (####, %04d and $F4 do, too), \
+                 or into a value of --define. One .blend file holds all frames, with --source cycles",
                 scene.display()
             ),
             (None, None) => {
@@ -346,8 +346,8 @@ fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
         let near = names.min_by_key(|name| edits(&typed, name)).filter(|name| edits(&typed, name) <= 2);
         let meant = near.map_or(String::new(), |name| format!("did you mean {name}? "));
         bail!(
-            "there is no built-in scene {scene:?}, and no file of that name; {meant}`noisefloor scenes` \
-             lists the scenes"
+            "there is no built-in scene {scene:?}, and no file of that name; \
+             {meant}`noisefloor scenes` lists the scenes"
         );
     }
     noisefloor_scenefile::load_with(path, options).map_err(|error| match (&error, elsewhere(path)) {

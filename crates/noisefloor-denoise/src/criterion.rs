@@ -18,6 +18,9 @@ use std::error::Error;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+/// What stands before and after the limit in the criterion's name.
+const AT_MOST: &str = "at most ";
+const JOD_LOST: &str = " JOD lost after ";
 /// A tile with more than one in this many pixels without valid samples gives no evidence.
 const NO_EVIDENCE: usize = 16;
 /// What is wrong with a picture is n^−DECAY of n samples: of noise, and of what Open Image Denoise makes of it
@@ -149,11 +152,21 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             1 => String::new(),
             count => format!(", mean of {count} mirror images"),
         };
-        format!("at most {} JOD lost after {}{guided}{mean}", self.lost, self.denoiser.name())
+        format!("{AT_MOST}{}{JOD_LOST}{}{guided}{mean}", self.lost, self.denoiser.name())
     }
 
     fn fingerprint(&self) -> String {
         self.name()
+    }
+
+    /// With a smaller limit.
+    fn asks_for_more_than(&self, fingerprint: &str) -> bool {
+        let parts = |text: &str| {
+            let (lost, how) = text.strip_prefix(AT_MOST)?.split_once(JOD_LOST)?;
+            Some((lost.parse::<f64>().ok()?, how.to_owned()))
+        };
+        let (kept, now) = (parts(fingerprint), parts(&self.name()));
+        kept.zip(now).is_some_and(|((kept, how), (now, how_now))| now < kept && how == how_now)
     }
 
     fn needs(&self) -> Needs {

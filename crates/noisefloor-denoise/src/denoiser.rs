@@ -83,6 +83,36 @@ pub enum DenoiseError {
 
 /// Turns a noisy picture into one that people look at.
 ///
+/// # Example
+/// ```
+/// use noisefloor::{Params, Rgb, Session};
+/// use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
+///
+/// /// The mean of each pixel and its neighbours in the row.
+/// struct Blur;
+///
+/// impl Denoiser for Blur {
+///     fn name(&self) -> String {
+///         "blur of three pixels".into()
+///     }
+///
+///     fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+///         let rows = picture.radiance.chunks_exact(picture.size.0);
+///         let blurred = |row: &[Rgb], x: usize| {
+///             let near = &row[x.saturating_sub(1)..(x + 2).min(row.len())];
+///             std::array::from_fn(|c| near.iter().map(|pixel| pixel[c]).sum::<f32>() / near.len() as f32)
+///         };
+///         Ok(rows.flat_map(|row| (0..row.len()).map(move |x| blurred(row, x))).collect())
+///     }
+/// }
+///
+/// // Tiles stop when their denoised picture has lost no more than is allowed
+/// let criterion = DenoisedQuality::new(Blur, DEFAULT_JODS_LOST);
+/// let session = Session::new(128, 128, criterion, Params::default().with_tile(64))?;
+/// assert_eq!(session.open_tiles(), 4);
+/// # Ok::<(), noisefloor::SessionError>(())
+/// ```
+///
 /// # For implementers
 /// - The result depends on the picture alone: the same picture gives the same result, whatever was denoised
 ///   before. A half buffer must not influence how the other one is denoised, or the measured error is too

@@ -263,8 +263,8 @@ impl Eyes {
             && version > VERSION
         {
             return Err(EyesError::Text(format!(
-                "version {version} of a newer noisefloor, and this one reads {VERSION}: use that one, or \
-                 calibrate again"
+                "version {version} of a newer noisefloor, and this one reads {VERSION}: use that one, \
+                 or calibrate again"
             )));
         }
         toml::from_str(text).map_err(|error| EyesError::Text(one_line(&error)))

@@ -93,8 +93,8 @@ pub enum FarmError {
     Write(#[from] WriteError),
     /// Another release planned the farm.
     #[error(
-        "{}: has format version {found}, and this release reads version {PLAN_VERSION}; finish it with the release \
-         that planned it, or plan the farm anew in another folder",
+        "{}: has format version {found}, and this release reads version {PLAN_VERSION}; \
+         finish it with the release that planned it, or plan the farm anew in another folder",
         path.display()
     )]
     Version {
@@ -157,8 +157,8 @@ pub enum FarmError {
     },
     /// Slurm works on the round.
     #[error(
-        "{}: round {number} is under way as Slurm jobs {} and {} ({left} left); `noisefloor farm status` shows how \
-         far it is, `scancel {} {}` ends it",
+        "{}: round {number} is under way as Slurm jobs {} and {} ({left} left); \
+         `noisefloor farm status` shows how far it is, `scancel {} {}` ends it",
         path.display(), tasks, step, tasks, step
     )]
     UnderWay {

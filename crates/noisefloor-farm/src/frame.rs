@@ -39,8 +39,8 @@ impl<S: Studio> Frame<'_, S> {
         let path = self.folder.frame(self.name);
         if let Some(file) = self.studio.occupied(&path) {
             let what = format!(
-                "holds a render already ({file}), which the farm would overwrite; move it away, or choose another \
-                 folder for the farm"
+                "holds a render already ({file}), which the farm would overwrite; move it away, \
+                 or choose another folder for the farm"
             );
             return Err(FarmError::Folder { path, what });
         }

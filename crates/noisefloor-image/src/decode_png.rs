@@ -185,8 +185,8 @@ fn code_points(points: CodingIndependentCodePoints) -> String {
     let CodingIndependentCodePoints { color_primaries, transfer_function, matrix_coefficients, .. } = points;
     let range = if points.is_video_full_range_image { "full" } else { "narrow" };
     format!(
-        "those of cICP {color_primaries}/{transfer_function}/{matrix_coefficients} in {range} range, which \
-         are not known here"
+        "those of cICP {color_primaries}/{transfer_function}/{matrix_coefficients} in {range} range, \
+         which are not known here"
     )
 }
 

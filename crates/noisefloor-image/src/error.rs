@@ -109,8 +109,8 @@ pub enum PictureError {
     },
     /// It has several layers, none of which is known to be the picture, and nobody said which is meant.
     #[error(
-        "{}: has the layers {found}, and does not say which is the picture; save that one by itself, or name it by \
-         --layer in `judge` and `metrics`",
+        "{}: has the layers {found}, and does not say which is the picture; save that one by itself, \
+         or name it by --layer in `judge` and `metrics`",
         path.display()
     )]
     Layers {
@@ -137,8 +137,8 @@ pub enum PictureError {
     },
     /// Its tiles have different numbers of samples, and one for all is needed.
     #[error(
-        "{}: has {fewest} to {most} samples per pixel, not the same everywhere; judge a picture rendered \
-         with --criterion spp:N, or give one number with --spp",
+        "{}: has {fewest} to {most} samples per pixel, not the same everywhere; \
+         judge a picture rendered with --criterion spp:N, or give one number with --spp",
         path.display()
     )]
     UnevenSamples {

@@ -44,8 +44,8 @@ impl Unread {
         }
         if let Some(colours) = &self.hdr {
             all.push(format!(
-                "it states {colours}; on a display without HDR, its white is 203 cd/m², and lighter parts \
-                 are clipped"
+                "it states {colours}; on a display without HDR, its white is 203 cd/m², \
+                 and lighter parts are clipped"
             ));
         }
         all

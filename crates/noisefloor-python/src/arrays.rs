@@ -18,8 +18,8 @@ impl<'py> FromPyObject<'_, 'py> for Pixels<'py> {
         let (kind, name) = dtype(&array)?;
         if kind != 'f' {
             let message = format!(
-                "pixels of dtype {name} are no radiance: pass linear floats, or to judge() and metrics() also \
-                 encoding=\"srgb\""
+                "pixels of dtype {name} are no radiance: pass linear floats, or to judge() and metrics() \
+                 also encoding=\"srgb\""
             );
             return Err(PictureError::new_err(message));
         }

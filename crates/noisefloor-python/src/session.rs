@@ -300,6 +300,22 @@ impl PySession {
         self.attached(py)?.push_running(tile.index, total, &pixels).map_err(Raise::raise)
     }
 
+    /// As push_image, for a renderer that keeps running means: the mean of all total samples per pixel so far. The new
+    /// samples are what it has more than each open tile.
+    ///
+    /// Raises SizeError, BatchError also if there are no new samples.
+    fn push_running_image(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole)] total: u64,
+        image: Pixels<'_>,
+    ) -> PyResult<()> {
+        let pixels = self.whole(&image)?;
+        let mut session = self.attached(py)?;
+        let session: &mut Session<Criterion> = &mut session;
+        pool::run(|| session.push_running_image(total, &pixels)).map_err(Raise::raise)
+    }
+
     /// Adds the mean of spp new samples per pixel of the whole picture to every open tile.
     ///
     /// image: array of shape (height, width, 3), linear radiance. Those of frameworks for GPUs (DLPack,

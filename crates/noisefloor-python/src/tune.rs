@@ -101,8 +101,8 @@ impl<T> Asked<T> {
             return Ok(&mut self.search);
         }
         Err(ParameterError::new_err(
-            "tell() answers next(), once: call next(), render what it returns, and tell what was found; after the end there is \
-             nothing to tell",
+            "tell() answers next(), once: call next(), render what it returns, and tell what was found; \
+             after the end there is nothing to tell",
         ))
     }
 }

@@ -119,6 +119,12 @@ class Sessions(unittest.TestCase):
         np.testing.assert_array_equal(whole.image(), frame)
         whole.push_running(0, 2, np.full((EDGE, EDGE, 3), 7.0))
         np.testing.assert_allclose(whole.image()[:EDGE, :EDGE], 7.0, rtol=1e-4)
+        running = nf.Session(96, 80, params=PARAMS)
+        running.push_running_image(1, frame)
+        running.push_running_image(3, frame + 2)
+        np.testing.assert_allclose(running.image(), frame + 2, rtol=1e-5)
+        with self.assertRaises(nf.BatchError):
+            running.push_running_image(3, frame)
 
     def test_a_float32_array_is_read_where_it_lies(self):
         statm = pathlib.Path("/proc/self/statm")

@@ -47,8 +47,8 @@ pub enum ChromaticityError {
     Triangle,
     /// Some primary would need a luminance below zero.
     #[error(
-        "the white {x}:{y} must lie inside the triangle of red, green and blue: give the white that this \
-         display shows, or other primaries"
+        "the white {x}:{y} must lie inside the triangle of red, green and blue: \
+         give the white that this display shows, or other primaries"
     )]
     White {
         /// Its x.

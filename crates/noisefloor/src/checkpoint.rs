@@ -1,6 +1,7 @@
 //! A snapshot of a session, for resuming it.
 
 use crate::container::{self, FileFault, Format, MAX_PAYLOAD};
+use crate::criterion::StoppingCriterion;
 use crate::display::Display;
 use crate::film::{Film, FilmHead};
 use crate::params::{Audience, Params, Schedule};
@@ -164,7 +165,7 @@ impl Checkpoint<'_> {
         &self,
         job: &str,
         source: &SourceIdentity,
-        criterion: &str,
+        criterion: &impl StoppingCriterion,
         params: &Params,
         fresh: &Film,
     ) -> Result<(), CheckpointError> {
@@ -173,7 +174,9 @@ impl Checkpoint<'_> {
         };
         same("job", self.job.to_string(), job.to_owned())?;
         source.change_since(&self.source).map_or(Ok(()), Err)?;
-        same("criterion", self.criterion.clone(), criterion.to_owned())?;
+        if !criterion.asks_for_more_than(&self.criterion) {
+            same("criterion", self.criterion.clone(), criterion.fingerprint())?;
+        }
         // More samples may be allowed than before
         let more = self.params.max_spp.max(params.max_spp);
         if let Some((what, kept, now)) = changed_param(&self.params.clone().with_max_spp(more), params) {

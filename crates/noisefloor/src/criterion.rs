@@ -229,6 +229,55 @@ pub enum CriterionError {
 /// the whole image once. A criterion may keep state between calls (one that compares with the previous
 /// picture does): hence `&mut`. One that says its state can be saved and resumed with its session.
 ///
+/// # Example
+/// Tiles stop when their two halves differ by less than a limit, on average over their pixels as displayed:
+///
+/// ```
+/// use noisefloor::criterion::{CriterionError, Needs, View};
+/// use noisefloor::{Params, Session, StoppingCriterion, Tile, Verdict};
+///
+/// struct HalvesAgree(f32);
+///
+/// impl StoppingCriterion for HalvesAgree {
+///     fn name(&self) -> String {
+///         "halves that agree".into()
+///     }
+///
+///     fn fingerprint(&self) -> String {
+///         format!("halves agree within {}", self.0)
+///     }
+///
+///     fn needs(&self) -> Needs {
+///         Needs::HALVES
+///     }
+///
+///     fn state(&self) -> Option<Vec<u8>> {
+///         Some(Vec::new()) // keeps nothing, and can be resumed
+///     }
+///
+///     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+///         let verdict = |tile: &Tile| {
+///             let pixels = tile.rows(view.film.width()).flatten();
+///             let difference = |pixel| {
+///                 let [(a, _), (b, _)] = view.film.pixel_halves(tile.index, pixel);
+///                 (view.display.luma(a) - view.display.luma(b)).abs()
+///             };
+///             Verdict::new(pixels.map(difference).sum::<f32>() / tile.pixels() as f32 <= self.0)
+///         };
+///         Ok(tiles.iter().map(verdict).collect())
+///     }
+/// }
+///
+/// let mut session = Session::new(64, 64, HalvesAgree(0.01), Params::default().with_tile(32))?;
+/// while !session.is_done() {
+///     for request in session.requests() {
+///         session.push(request.tile.index, request.spp, &vec![[0.5; 3]; request.tile.pixels()])?;
+///     }
+///     session.judge()?;
+/// }
+/// # Ok::<(), noisefloor::SessionError>(())
+/// ```
+///
 /// # For implementers
 /// - Return one verdict for each tile, in order, with probabilities from 0 to 1. Fewer, more or others are
 ///   [`CriterionError::Contract`], and no tile stops by them.
@@ -246,6 +295,12 @@ pub trait StoppingCriterion {
     /// Everything its verdicts depend on besides the film and the display: model digest, threshold,
     /// constants. Two criteria with the same fingerprint and state give the same verdicts.
     fn fingerprint(&self) -> String;
+
+    /// Whether whatever satisfies this criterion satisfies the one with that fingerprint, as with another limit. Then a session of
+    /// that criterion can be resumed with this one: its tiles that were done are judged again. By default no.
+    fn asks_for_more_than(&self, _fingerprint: &str) -> bool {
+        false
+    }
 
     /// A new film begins, with these tiles.
     fn begin(&mut self, _grid: TileGrid) {}
@@ -336,6 +391,11 @@ impl StoppingCriterion for FixedSpp {
 
     fn fingerprint(&self) -> String {
         self.name()
+    }
+
+    fn asks_for_more_than(&self, fingerprint: &str) -> bool {
+        let spp = fingerprint.strip_suffix(" samples per pixel").and_then(|spp| spp.parse::<u64>().ok());
+        spp.is_some_and(|spp| spp < self.0)
     }
 
     fn only_counts(&self) -> bool {

@@ -217,6 +217,16 @@ impl Film {
         self.grid
     }
 
+    /// Image width in pixels.
+    pub fn width(&self) -> usize {
+        self.grid.width()
+    }
+
+    /// Image height in pixels.
+    pub fn height(&self) -> usize {
+        self.grid.height()
+    }
+
     /// Whether the film keeps two halves.
     pub fn has_halves(&self) -> bool {
         self.halves.len() == 2

@@ -357,6 +357,12 @@ impl Oracle {
         described
     }
 
+    /// What stands before and after the share of people in the fingerprint.
+    fn around_people(&self) -> [String; 2] {
+        let scatter = self.scatter.map(|s| format!(", measured within {s}")).unwrap_or_default();
+        [format!("model {}, ", self.model.fingerprint()), format!(" of people{scatter}, unmet light 1")]
+    }
+
     fn misfit(&self, error: DescriptorError) -> CriterionError {
         match error {
             DescriptorError::TileSize { expected, width, height } => {
@@ -445,8 +451,17 @@ impl StoppingCriterion for Oracle {
     }
 
     fn fingerprint(&self) -> String {
-        let scatter = self.scatter.map(|s| format!(", measured within {s}")).unwrap_or_default();
-        format!("model {}, {} of people{scatter}, unmet light 1", self.model.fingerprint(), self.people)
+        let [before, after] = self.around_people();
+        format!("{before}{}{after}", self.people)
+    }
+
+    /// Where more people are to see no noise.
+    fn asks_for_more_than(&self, fingerprint: &str) -> bool {
+        let [before, after] = self.around_people();
+        let people = fingerprint.strip_prefix(&before).and_then(|rest| rest.strip_suffix(&after));
+        people
+            .and_then(|people| people.parse::<People>().ok())
+            .is_some_and(|p| p.share() < self.people.share())
     }
 
     fn begin(&mut self, grid: TileGrid) {

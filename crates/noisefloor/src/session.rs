@@ -353,7 +353,27 @@ impl<C: StoppingCriterion> Session<C> {
         Ok(())
     }
 
-    /// Judges the tiles that are due, and returns those that are now done.
+    /// Adds the new samples in a running mean of the whole image, row-major, to every open tile: `total` samples per pixel so
+    /// far, more than each of them has.
+    ///
+    /// # Errors
+    /// As of [`Session::push_image`] and [`Session::push_running`]: tiles before the one that is refused have the samples then.
+    pub fn push_running_image(&mut self, total: u64, image: &[Rgb]) -> Result<(), SessionError> {
+        let (width, expected) = (self.film.width(), self.film.width() * self.film.height());
+        if image.len() != expected {
+            return Err(SessionError::Image { got: image.len(), expected });
+        }
+        for tile in
+            self.film.grid().tiles().filter(|tile| self.tiles[tile.index].stop.is_none()).collect::<Vec<_>>()
+        {
+            let mean: Vec<Rgb> = tile.rows(width).flat_map(|row| &image[row]).copied().collect();
+            self.push_running(tile.index, total, &mean)?;
+        }
+        Ok(())
+    }
+
+    /// Judges the tiles that are due, and returns those that are now done. On all threads of the rayon pool that it is
+    /// called in; a verdict of the oracle takes 0.4 ms of one processor for a tile of 128×128 pixels.
     ///
     /// The first verdicts wait until every open tile has samples: the exposure is settled then, as that of
     /// the converged picture, unless the tone mapping has one or [`Session::set_display`] was called. It is

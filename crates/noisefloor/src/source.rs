@@ -310,6 +310,42 @@ pub enum SourceError {
 /// one wavefront of a GPU). Batches are means of *new* samples only, so that the film can keep two
 /// independent halves of any source, and no renderer has to know what a half buffer is.
 ///
+/// # Example
+/// A renderer whose pixels follow from pixel and sample number, so that a session of it can be resumed:
+///
+/// ```
+/// use noisefloor::{Batch, Driver, DriverError, FixedSpp, Params, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
+///
+/// struct Noise;
+///
+/// /// One sample of one pixel: 0.0 to 1.0, the same for the same numbers.
+/// fn sample(x: usize, y: usize, index: u64) -> f32 {
+///     let mixed = (index ^ ((x as u64) << 20) ^ ((y as u64) << 40)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+///     ((mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f32 / (1u64 << 24) as f32
+/// }
+///
+/// impl ProgressiveSource for Noise {
+///     fn info(&self) -> SourceInfo {
+///         SourceInfo::new("noise", 64, 64).with_repeats(Repeats::Samples)
+///     }
+///
+///     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
+///         let batch = |request: &Request| {
+///             let (tile, samples) = (request.tile, request.first..request.first + request.spp);
+///             let pixels = (tile.y..tile.y + tile.height).flat_map(|y| (tile.x..tile.x + tile.width).map(move |x| (x, y)));
+///             let mean = |(x, y)| samples.clone().map(|index| sample(x, y, index)).sum::<f32>() / request.spp as f32;
+///             Batch::new(tile, request.spp, pixels.map(|pixel| [mean(pixel); 3]).collect())
+///         };
+///         Ok(requests.iter().map(batch).collect())
+///     }
+/// }
+///
+/// let mut driver = Driver::new(Noise, FixedSpp(64), Params::default().with_tile(32))?;
+/// driver.run(|_, _| ())?;
+/// assert_eq!(driver.session().film().total_samples(), 64 * 64 * 64);
+/// # Ok::<(), DriverError>(())
+/// ```
+///
 /// # For implementers
 /// - Return one batch for each request, in the order of the requests. A source that cannot aim
 ///   ([`SourceInfo::aims`] is false) is always asked for all tiles.

@@ -114,9 +114,10 @@ pub enum StillError {
     },
     /// The files say that the noise of the pictures is related, and not how.
     #[error(
-        "both pictures come from {origin} with seed {seed}, but with other options, or from a renderer that does \
-         not repeat its samples: they are made from the same random numbers, and nobody can tell how much of their \
-         noise they share; render one with another seed, or say whether they are nested or independent"
+        "both pictures come from {origin} with seed {seed}, but with other options, \
+         or from a renderer that does not repeat its samples: they are made from the same random numbers, \
+         and nobody can tell how much of their noise they share; render one with another seed, \
+         or say whether they are nested or independent"
     )]
     Dependent {
         /// Scene and renderer.
@@ -126,20 +127,21 @@ pub enum StillError {
     },
     /// Two of the pictures compared with share samples, which would count twice.
     #[error(
-        "two of the pictures to compare with ({} and {} samples per pixel) are the same or share samples, which \
-         would count twice; leave one out", .0[0], .0[1]
+        "two of the pictures to compare with ({} and {} samples per pixel) are the same or share samples, \
+         which would count twice; leave one out", .0[0], .0[1]
     )]
     Twice([f64; 2]),
     /// Light that cannot be.
     #[error(
-        "the mean luminance of a picture is negative ({0:.3e}): light is not; look for a broken material or light, or for \
-         what was subtracted from it"
+        "the mean luminance of a picture is negative ({0:.3e}): light is not; \
+         look for a broken material or light, or for what was subtracted from it"
     )]
     Light(f64),
     /// Two different things.
     #[error(
-        "the pictures differ in brightness by more than noise explains, everywhere: they are no two renderings of one \
-         view with one exposure, and their difference says nothing about noise"
+        "the pictures differ in brightness by more than noise explains, everywhere: \
+         they are no two renderings of one view with one exposure, \
+         and their difference says nothing about noise"
     )]
     Unlike,
     /// The model does not fit the tiles.
@@ -153,14 +155,15 @@ pub enum StillError {
 pub enum StillWarning {
     /// Their difference is no independent noise of pixels.
     #[error(
-        "the noise of neighbouring pixels is correlated ({0:.2}): the pictures were denoised, blurred, scaled, or rendered \
-         with a wide pixel filter; verdicts are made for independent pixels, and come too early or too late"
+        "the noise of neighbouring pixels is correlated ({0:.2}): the pictures were denoised, blurred, \
+         scaled, or rendered with a wide pixel filter; verdicts are made for independent pixels, \
+         and come too early or too late"
     )]
     Neighbours(f64),
     /// One has another exposure.
     #[error(
-        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: render both with one \
-         exposure, as their difference is not noise alone"
+        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: \
+         render both with one exposure, as their difference is not noise alone"
     )]
     Brightness(f64),
     /// Tiles of another brightness.
@@ -179,8 +182,8 @@ pub enum StillWarning {
     Quantised(Encoding),
     /// Noise is cut off at white, in this share of the noisy pixels, in per cent.
     #[error(
-        "no value is above 1, and the noise of {0:.0} % of the noisy pixels ends there: compare linear radiance, not what \
-         is shown on a screen"
+        "no value is above 1, and the noise of {0:.0} % of the noisy pixels ends there: \
+         compare linear radiance, not what is shown on a screen"
     )]
     Clipped(f64),
 }

@@ -94,8 +94,8 @@ pub enum KnobError {
     },
     /// Thresholds.
     #[error(
-        "a threshold is sought from {coarsest} down to {finest}: both must be positive, the first not below the second and at \
-         most 10⁹ times it"
+        "a threshold is sought from {coarsest} down to {finest}: both must be positive, \
+         the first not below the second and at most 10⁹ times it"
     )]
     Threshold {
         /// The coarsest.

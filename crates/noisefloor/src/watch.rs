@@ -115,8 +115,8 @@ pub enum Fault {
     },
     /// Batches equal to those before.
     #[error(
-        "{tiles} of {of} tiles got the same batch twice, and other ones beside it: give every batch random numbers of \
-         its own, such as a seed that counts batches"
+        "{tiles} of {of} tiles got the same batch twice, and other ones beside it: \
+         give every batch random numbers of its own, such as a seed that counts batches"
     )]
     Repeated {
         /// Tiles that got one twice.
@@ -126,8 +126,8 @@ pub enum Fault {
     },
     /// Batches that contain the ones before.
     #[error(
-        "batches contain the samples of the ones before (correlation {correlation:.2}): push means of new samples \
-         only, or running means by push_running"
+        "batches contain the samples of the ones before (correlation {correlation:.2}): \
+         push means of new samples only, or running means by push_running"
     )]
     Running {
         /// Correlation of what should be independent.
@@ -135,8 +135,8 @@ pub enum Fault {
     },
     /// Batches that follow each other are more alike than others.
     #[error(
-        "successive batches are alike (correlation {correlation:.2}): they share samples, because seeds repeat or \
-         overlap, or the scene changes while it is rendered"
+        "successive batches are alike (correlation {correlation:.2}): they share samples, \
+         because seeds repeat or overlap, or the scene changes while it is rendered"
     )]
     Shared {
         /// Correlation of what should be independent.
@@ -152,8 +152,8 @@ pub enum Fault {
     },
     /// Numbers that are too coarse for what they are used for.
     #[error(
-        "all values are {0}: means of so few bits end where a batch changes them by less than a step, and integers \
-         hold no light above white; add up and push 32-bit floats"
+        "all values are {0}: means of so few bits end where a batch changes them by less than a step, \
+         and integers hold no light above white; add up and push 32-bit floats"
     )]
     Rounded(Precision),
     /// Light too weak for 32-bit floats.
@@ -228,8 +228,8 @@ impl fmt::Display for Precision {
 pub enum Warning {
     /// Neighbouring pixels share samples.
     #[error(
-        "the noise of neighbouring pixels is correlated ({0:.2}): by a pixel filter, a denoiser or splats; verdicts \
-         are made for independent pixels, and come too early or too late"
+        "the noise of neighbouring pixels is correlated ({0:.2}): by a pixel filter, a denoiser or splats; \
+         verdicts are made for independent pixels, and come too early or too late"
     )]
     Neighbours(f64),
     /// Successive batches are a little alike.
@@ -239,32 +239,33 @@ pub enum Warning {
     Shared(f64),
     /// Whole tiles become brighter or darker.
     #[error(
-        "the brightness of whole tiles changes from batch to batch (correlation {0:.2}): if the scene changes, render \
-         each state by itself; if a Markov chain does, say that pixels share samples"
+        "the brightness of whole tiles changes from batch to batch (correlation {0:.2}): \
+         if the scene changes, render each state by itself; if a Markov chain does, \
+         say that pixels share samples"
     )]
     Changing(f64),
     /// Batches complement each other.
     #[error(
-        "successive batches are anticorrelated ({0:.2}), as points of one quasi-random sequence are: verdicts take \
-         noise for larger than it is, and come late"
+        "successive batches are anticorrelated ({0:.2}), as points of one quasi-random sequence are: \
+         verdicts take noise for larger than it is, and come late"
     )]
     Anticorrelated(f64),
     /// Batches of one size have different noise.
     #[error(
-        "batches of equal size differ in noise: the earlier has {0:.2} times the energy of the later; verdicts \
-         expect it to depend on the number of samples only"
+        "batches of equal size differ in noise: the earlier has {0:.2} times the energy of the later; \
+         verdicts expect it to depend on the number of samples only"
     )]
     Noise(f64),
     /// Noise does not fall with the number of samples.
     #[error(
-        "batches that are said to have more samples have {0:.2} times the noise energy that their numbers say: push \
-         with each batch the number of its own samples, and not of all so far"
+        "batches that are said to have more samples have {0:.2} times the noise energy that their numbers say: \
+         push with each batch the number of its own samples, and not of all so far"
     )]
     Counts(f64),
     /// The brightness depends on the number of samples.
     #[error(
-        "batches of more samples are brighter, by {0:.2} %, and means of linear radiance are not: are the values \
-         encoded for a screen, tone mapped or clamped, or sums instead of means?"
+        "batches of more samples are brighter, by {0:.2} %, and means of linear radiance are not: \
+         are the values encoded for a screen, tone mapped or clamped, or sums instead of means?"
     )]
     Encoded(f64),
     /// The tiles do not fit together.
@@ -272,8 +273,8 @@ pub enum Warning {
     MixedUp(MixUp),
     /// Noise is cut off at white.
     #[error(
-        "no value is above 1, and the noise of {0:.0} % of the noisy pixels ends there: push linear radiance, not \
-         what is shown on a screen"
+        "no value is above 1, and the noise of {0:.0} % of the noisy pixels ends there: \
+         push linear radiance, not what is shown on a screen"
     )]
     Clipped(f64),
     /// One value everywhere.
@@ -281,8 +282,9 @@ pub enum Warning {
     Constant(Rgb),
     /// All batches are the same, and nothing says whether they have noise.
     #[error(
-        "all batches of {tiles} of {of} tiles are the same picture: either it has no noise, or every batch got the same \
-         random numbers; no tile is done before a batch of another number of samples tells"
+        "all batches of {tiles} of {of} tiles are the same picture: either it has no noise, \
+         or every batch got the same random numbers; \
+         no tile is done before a batch of another number of samples tells"
     )]
     Repeated {
         /// Tiles of which all batches are the same.
@@ -306,16 +308,18 @@ pub enum Warning {
     },
     /// Nothing shows whether values are linear.
     #[error(
-        "no value is above 1, and all batches have one size: nothing tells linear radiance from values that are encoded for \
-         a screen, by which tiles stop up to twice too early; if these are linear, say so once (set_linear in Rust, \
+        "no value is above 1, and all batches have one size: \
+         nothing tells linear radiance from values that are encoded for a screen, \
+         by which tiles stop up to twice too early; if these are linear, say so once (set_linear in Rust, \
          nf_session_set_linear in C, linear in Python and JavaScript)"
     )]
     Unsaid,
     /// Running means have more samples than they are said to have.
     #[error(
         "the first running means differ by less than their numbers of samples say (by {0:.2} times as much in those after): \
-         the count seems to be behind the picture; wait until the renderer has written all of a pass before you read it, and \
-         count the samples that the picture then has"
+         the count seems to be behind the picture; \
+         wait until the renderer has written all of a pass before you read it, \
+         and count the samples that the picture then has"
     )]
     Behind(f64),
     /// Batches of more and more samples look like running means.

@@ -74,8 +74,9 @@ pub enum TrainError {
     Svm(#[from] SvmTrainError),
     /// All examples are noisy, or all are converged.
     #[error(
-        "all {examples} examples{} are {}, and training needs both: check that every threshold lies between the first \
-         and the last level of its zone, and that not all zones are censored",
+        "all {examples} examples{} are {}, and training needs both: \
+         check that every threshold lies between the first and the last level of its zone, \
+         and that not all zones are censored",
         without.as_ref().map_or(String::new(), |group| format!(" without those of {group}")),
         if *converged { "converged" } else { "noisy" }
     )]
@@ -89,9 +90,10 @@ pub enum TrainError {
     },
     /// What people said has nothing to do with what was measured of the noise.
     #[error(
-        "what people said does not follow the noise: in {} of {of} groups of scenes ({}), what was learned from the \
-         others does not tell noisy examples from converged ones; check that every threshold stands beside its own \
-         zone, and that each zone's pictures are in the order of their samples",
+        "what people said does not follow the noise: in {} of {of} groups of scenes ({}), \
+         what was learned from the others does not tell noisy examples from converged ones; \
+         check that every threshold stands beside its own zone, \
+         and that each zone's pictures are in the order of their samples",
         groups.len(),
         groups.join(", ")
     )]

@@ -40,8 +40,8 @@ pub enum StudyError {
     },
     /// A picture differs in size from its stack.
     #[error(
-        "{}: {got:?} pixels, but the most converged picture of the stack has {want:?}; render it again at \
-         that size",
+        "{}: {got:?} pixels, but the most converged picture of the stack has {want:?}; \
+         render it again at that size",
         path.display()
     )]
     Size {
@@ -108,8 +108,8 @@ pub enum StoreError {
     },
     /// The database holds the answers to another study.
     #[error(
-        "{}: holds answers to another study, or to an earlier design of this one; name another `database` \
-         in the study file",
+        "{}: holds answers to another study, or to an earlier design of this one; \
+         name another `database` in the study file",
         path.display()
     )]
     OtherStudy {

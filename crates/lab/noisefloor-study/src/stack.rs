@@ -82,8 +82,8 @@ impl StudyStack {
             .map_err(|source| StudyError::Tile { name: name.clone(), source })?;
         if grid.len() > MAX_TILES || width * height > MAX_PIXELS {
             let what = format!(
-                "stack {name}: {width}×{height} pixels in {} tiles; the limits are {MAX_PIXELS} pixels and \
-                 {MAX_TILES} tiles, so use larger tiles or a crop",
+                "stack {name}: {width}×{height} pixels in {} tiles; \
+                 the limits are {MAX_PIXELS} pixels and {MAX_TILES} tiles, so use larger tiles or a crop",
                 grid.len()
             );
             return Err(StudyError::File { path: folder, what });

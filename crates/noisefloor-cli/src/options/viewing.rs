@@ -45,8 +45,8 @@ pub fn judged_by(viewing: Option<Viewing>, oracle: &Oracle) -> anyhow::Result<Vi
     let asked = viewing.unwrap_or_else(|| model.viewing());
     if asked != model.viewing() && !model.descriptor().knows_viewing() {
         refuse!(
-            "--viewing {asked}: this model was trained for {}, and its descriptor does not know what other \
-             conditions change",
+            "--viewing {asked}: this model was trained for {}, \
+             and its descriptor does not know what other conditions change",
             model.viewing()
         );
     }

@@ -76,8 +76,8 @@ pub struct Factor {
 pub enum CalibrationRefusal {
     /// Easy trials were missed.
     #[error(
-        "{missed} of {of} pictures with strong noise were missed, as by guessing; nothing is saved; calibrate again when you have \
-         time"
+        "{missed} of {of} pictures with strong noise were missed, as by guessing; nothing is saved; \
+         calibrate again when you have time"
     )]
     Guessed {
         /// Easy trials that were answered wrongly.

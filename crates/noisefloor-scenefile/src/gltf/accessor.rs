@@ -125,8 +125,8 @@ impl<'a> Reader<'a> {
         let end = last.and_then(|x| x.checked_add(size as u64));
         if count > 0 && end.is_none_or(|end| end > bytes.len() as u64) {
             return Err(self.bad(format_args!(
-                "{count} elements of {size} bytes, {stride} apart from byte {start}, reach past the end of buffer \
-                 view {}, which has {} bytes",
+                "{count} elements of {size} bytes, {stride} apart from byte {start}, \
+                 reach past the end of buffer view {}, which has {} bytes",
                 view.value(),
                 bytes.len()
             )));

@@ -199,8 +199,8 @@ impl Reader<'_> {
                 // Names and formats of files
                 params.ignore(&["filename", "diagonal", "savefp16"]);
                 if self.view.clamp.is_some() {
-                    let what = "`maxcomponentvalue` bounds red, green and blue, where the sensor of pbrt \
-                        bounds X, Y and Z";
+                    let what = "`maxcomponentvalue` bounds red, green and blue, \
+                        where the sensor of pbrt bounds X, Y and Z";
                     self.approximated(&params.place, what);
                 }
                 self.say_unused(params, called);

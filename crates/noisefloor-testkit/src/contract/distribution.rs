@@ -77,8 +77,9 @@ fn compare(what: &str, question: &str, numbers: &[f64]) {
     let mean = |numbers: &[f64]| numbers.iter().sum::<f64>() / numbers.len() as f64;
     assert!(
         welch(long, short) > FALSE_ALARM,
-        "the {what} of 32 samples depends on how requests are cut: {question}? It is {:.3} at once and {:.3} in four \
-         parts of 8, on average over {LONG} batches each, where the noise of 32 samples is 1",
+        "the {what} of 32 samples depends on how requests are cut: {question}? \
+         It is {:.3} at once and {:.3} in four parts of 8, on average over {LONG} batches each, \
+         where the noise of 32 samples is 1",
         mean(long),
         mean(short),
     );

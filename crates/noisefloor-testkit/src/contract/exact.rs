@@ -27,8 +27,8 @@ pub(super) fn check_cut(whole: &Round, parts: &[Round]) {
                 let close = (both - all).abs() <= ROUNDING * size || !(both.is_finite() && all.is_finite());
                 assert!(
                     close,
-                    "samples depend on how requests are cut: tile {tile}, pixel {pixel} is {both} in two \
-                     batches and {all} in one"
+                    "samples depend on how requests are cut: tile {tile}, \
+                     pixel {pixel} is {both} in two batches and {all} in one"
                 );
             }
         }

@@ -60,8 +60,8 @@ fn check_neighbours(rounds: &[Round]) {
         let z = z(&terms);
         assert!(
             z.abs() < LARGEST_Z,
-            "neighbouring pixels have noise in common: z = {z}; if a pixel filter, a denoiser or splats are meant \
-             to, say PixelNoise::Shared"
+            "neighbouring pixels have noise in common: z = {z}; if a pixel filter, \
+             a denoiser or splats are meant to, say PixelNoise::Shared"
         );
     }
 }

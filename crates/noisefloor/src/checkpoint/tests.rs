@@ -106,6 +106,40 @@ fn a_finished_run_goes_on_with_more_samples() {
     assert!(words.contains("its most samples per pixel is 100, not 80"), "{words}");
 }
 
+/// A finished run of a criterion is resumed with one that asks for more, and with no other: tiles that it does not satisfy go
+/// on, and all have at least what they had.
+fn goes_on_with<C: StoppingCriterion>(kept_with: C, more: C, less: C) {
+    let finished = |criterion: C| {
+        let mut driver = Driver::new(Noise(Repeats::Samples), criterion, params()).unwrap();
+        driver.run(|_, _| ()).unwrap();
+        driver
+    };
+    let (before, kept_less) = (finished(kept_with), less.fingerprint());
+    let bytes = kept(&before);
+    let resume = |criterion: C| {
+        let fresh = Driver::new(Noise(Repeats::Samples), criterion, params()).unwrap();
+        fresh.resume("noise", Checkpoint::read(&bytes[..]).unwrap())
+    };
+    let words = resume(less).map(drop).unwrap_err().to_string();
+    assert!(words.contains(&kept_less), "{words}");
+    let mut resumed = resume(more).unwrap();
+    resumed.run(|_, _| ()).unwrap();
+    let mut grown = 0;
+    for (was, is) in before.session().stops().zip(resumed.session().stops()) {
+        assert!(is.tile == was.tile && is.spp >= was.spp && is.reason.is_final(), "{was:?}, {is:?}");
+        grown += usize::from(is.spp > was.spp);
+    }
+    assert!(grown > 0);
+}
+
+#[cfg(feature = "bundled-model")]
+#[test]
+fn a_finished_run_goes_on_where_more_is_asked_for() {
+    let people = |share| Oracle::new(crate::Model::bundled(), crate::People::new(share).unwrap());
+    goes_on_with(people(0.9), people(0.99), people(0.5));
+    goes_on_with(FixedSpp(40), FixedSpp(100), FixedSpp(20));
+}
+
 /// What may be wrong with a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Habit {
@@ -254,7 +288,7 @@ fn another_job_is_refused() {
     };
     assert_eq!(refused(Repeats::Samples, 40, params(), "noise"), None);
     begins(refused(Repeats::Samples, 40, params(), "silence"), &other("job"));
-    begins(refused(Repeats::Samples, 50, params(), "noise"), &other("criterion"));
+    begins(refused(Repeats::Samples, 30, params(), "noise"), &other("criterion"));
     begins(
         refused(Repeats::Samples, 40, Params { consecutive: 2, ..params() }, "noise"),
         &other("number of verdicts in a row is 1, not 2"),
@@ -262,8 +296,8 @@ fn another_job_is_refused() {
     let other_model = {
         let driver = broken_off(Oracle::bundled(), 1);
         let checkpoint = Checkpoint::read(&kept(&driver)[..]).unwrap();
-        let stricter = Oracle::new(crate::Model::bundled(), crate::People::new(0.99).unwrap());
-        let driver = Driver::new(Noise(Repeats::Samples), stricter, params()).unwrap();
+        let laxer = Oracle::new(crate::Model::bundled(), crate::People::new(0.9).unwrap());
+        let driver = Driver::new(Noise(Repeats::Samples), laxer, params()).unwrap();
         driver.resume("noise", checkpoint).err().map(|e| e.to_string())
     };
     begins(other_model, &other("criterion"));

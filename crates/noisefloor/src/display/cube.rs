@@ -57,8 +57,8 @@ pub enum CubeError {
     },
     /// An entry that is no display value.
     #[error(
-        "entry {entry} is {value}: what a LUT returns is shown, and lies from 0 to 1; divide values of 8, 10 or 12 bits by the \
-         largest"
+        "entry {entry} is {value}: what a LUT returns is shown, and lies from 0 to 1; divide values of 8, \
+         10 or 12 bits by the largest"
     )]
     Value {
         /// Its place, from 0.

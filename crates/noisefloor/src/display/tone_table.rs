@@ -52,8 +52,8 @@ pub enum ToneTableError {
     NotFinite(usize),
     /// A value is no display value.
     #[error(
-        "value {place} of the tone table is {value}: display values are sRGB-encoded and lie from 0 to 1; divide those of \
-         8 bits by 255"
+        "value {place} of the tone table is {value}: display values are sRGB-encoded and lie from 0 to 1; \
+         divide those of 8 bits by 255"
     )]
     Value {
         /// Its place among all numbers.

@@ -32,7 +32,9 @@ impl<C: StoppingCriterion> Session<C> {
     /// Resumes another session of the same job where it stood. Tiles that were ended by a limit or a failure
     /// are open again; those that have converged, or have as many samples as are allowed, are not. More samples may be
     /// allowed than before ([`Params::max_spp`](crate::Params::max_spp)): tiles that ended at the old limit are open for
-    /// their next verdict then, which need not come where it would have come with the new limit from the start.
+    /// their next verdict then, which need not come where it would have come with the new limit from the start. The criterion
+    /// may ask for more than before ([`StoppingCriterion::asks_for_more_than`]), such as a larger share of people or a smaller
+    /// loss: tiles that were done are then judged again, with the samples that they have.
     ///
     /// If the same samples are pushed, everything that follows equals the session that was not interrupted,
     /// to the bit: its [warnings](Session::warnings) and faults, too. Pixels share samples if either session
@@ -43,7 +45,8 @@ impl<C: StoppingCriterion> Session<C> {
     /// model, threshold, constants), parameters or image size are not those of the checkpoint, or if it
     /// contradicts itself.
     pub fn resume(mut self, job: &str, checkpoint: Checkpoint<'_>) -> Result<Self, CheckpointError> {
-        checkpoint.check(job, &self.source, &self.criterion.fingerprint(), &self.params, &self.film)?;
+        checkpoint.check(job, &self.source, &self.criterion, &self.params, &self.film)?;
+        let asks_for_more = checkpoint.criterion != self.criterion.fingerprint();
         if !self.criterion.restore(self.film.grid(), &checkpoint.state) {
             return Err(CheckpointError::Invalid("the state of its criterion is not valid"));
         }
@@ -58,6 +61,9 @@ impl<C: StoppingCriterion> Session<C> {
             if state.stop.is_some_and(|stop| stop.reason == StopReason::MaxSpp) && spp < max_spp {
                 state.stop = None;
                 state.goal = Goal::Verdict { spp: schedule.next(spp, None, 1.0).min(max_spp), streak: 0 };
+            }
+            if asks_for_more && state.stop.is_some_and(|stop| stop.reason.is_satisfied()) {
+                (state.stop, state.goal) = (None, Goal::Verdict { spp, streak: 0 });
             }
             state.stop = state.stop.filter(|stop: &Stop| stop.reason.is_final());
         }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::criterion::Needs;
+use crate::criterion::{FixedSpp, Needs};
 use crate::params::Schedule;
 
 /// Says "converged" from given samples on, with halves or without.
@@ -296,4 +296,27 @@ fn an_image_is_pushed_up_to_the_tile_that_is_refused() {
     assert_eq!(spp, [8, 8, 8, 8, 8, 0, 0, 0]);
     let none = session.push_image(0, &vec![[0.5; 3]; 64 * 32]).unwrap_err();
     assert!(matches!(none, SessionError::Film(FilmError::NothingNew { tile: 0, .. })), "{none}");
+}
+
+/// A running mean of the whole picture is that of each of its tiles; finished tiles keep what they have.
+#[test]
+fn running_means_of_pictures_are_those_of_tiles() {
+    let params = || Params::default().with_tile(32);
+    let mut sessions = [(); 2].map(|()| Session::new(80, 32, FixedSpp(50), params()).unwrap());
+    let picture = |level: f32| -> Vec<Rgb> { (0..80 * 32).map(|i| [level + i as f32; 3]).collect() };
+    let [whole, tiles] = &mut sessions;
+    whole.close(1, Interruption::Cancelled);
+    tiles.close(1, Interruption::Cancelled);
+    for (total, level) in [(3, 1.0), (8, 2.0)] {
+        let image = picture(level);
+        whole.push_running_image(total, &image).unwrap();
+        for tile in tiles.film().grid().tiles().filter(|tile| tile.index != 1) {
+            let mean: Vec<Rgb> = tile.rows(80).flat_map(|row| &image[row]).copied().collect();
+            tiles.push_running(tile.index, total, &mean).unwrap();
+        }
+    }
+    assert_eq!(whole.film().image(), tiles.film().image());
+    assert_eq!((whole.film().spp(0), whole.film().spp(1)), (8, 0));
+    assert!(matches!(whole.push_running_image(9, &picture(1.0)[1..]), Err(SessionError::Image { .. })));
+    assert!(matches!(whole.push_running_image(8, &picture(1.0)), Err(SessionError::Film(_))));
 }

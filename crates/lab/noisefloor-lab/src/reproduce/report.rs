@@ -23,20 +23,26 @@ impl ReproductionReport {
         let real = outcomes.first().map(|o| total(o).1).unwrap_or_default();
         let notes = vec![
             format!(
-                "All levels that are learned are synthesised: {} a zone with equal steps up to its most converged image, noise ∝ 1/√n \
-                 from two realisations in turn. Real images ({}) are asked about, never learned, and counted apart; but the noise that is laid over a scene is taken \
-                 from them.",
+                "All levels that are learned are synthesised: \
+                 {} a zone with equal steps up to its most converged image, \
+                 noise ∝ 1/√n from two realisations in turn. Real images ({}) are asked about, \
+                 never learned, and counted apart; \
+                 but the noise that is laid over a scene is taken from them.",
                 job.levels,
                 real.noisy + real.identical,
             ),
-            "Where a scene has no reference.exr, the most converged image stands in for the ray-traced reference. The paper's reference has \
-             no noise, and other light."
+            "Where a scene has no reference.exr, \
+             the most converged image stands in for the ray-traced reference. \
+             The paper's reference has no noise, and other light."
                 .into(),
-            "The paper states neither the scaling of its values nor which pairs its accuracy is of. Here: display values, white at 1, and \
-             each number standardised over all synthesised pairs (also those that are asked about); and four ways to choose the pairs."
+            "The paper states neither the scaling of its values nor which pairs its accuracy is of. Here: \
+             display values, white at 1, \
+             and each number standardised over all synthesised pairs (also those that are asked about); \
+             and four ways to choose the pairs."
                 .into(),
-            "A pair is right if the sign of its decision value is. \"Always identical\" is what a machine gets that never sees noise; one \
-             that always sees it gets the rest."
+            "A pair is right if the sign of its decision value is. \
+             \"Always identical\" is what a machine gets that never sees noise; \
+             one that always sees it gets the rest."
                 .into(),
             "Two machines train at once, where there are several.".into(),
         ];

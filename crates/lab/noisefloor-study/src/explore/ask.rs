@@ -156,8 +156,8 @@ struct Retraining {
 pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
     let at = people(read_json::<Retraining>(body).await?.people)?;
     let Some(table) = app.setup.table.clone() else {
-        let do_ = "start `noisefloor-lab explore --table FILE`, with the project's fixtures/human-table.csv or a table \
-            written by `train --save-table`";
+        let do_ = "start `noisefloor-lab explore --table FILE`, \
+            with the project's fixtures/human-table.csv or a table written by `train --save-table`";
         return Err(refuse("there is no table of human thresholds to train on", "table", do_));
     };
     let here = here(&app);

@@ -57,8 +57,8 @@ pub fn run(mut job: CompareJob) -> anyhow::Result<ExitCode> {
     if job.earlier == Earlier::Keep && folder.first_of(&["index.html"]).is_some() {
         let path = job.out.display();
         let what = format!(
-            "{path}: holds a comparison; --force overwrites it, and uses its references where they still \
-             fit; --out names another folder"
+            "{path}: holds a comparison; --force overwrites it, \
+             and uses its references where they still fit; --out names another folder"
         );
         return Err(Usage(what).into());
     }

@@ -48,8 +48,8 @@ fn show(path: &Path) -> anyhow::Result<()> {
         Eyes::read(path)?.people()
     {
         say!(
-            "{name}: {factor:.2} times the samples of the model's observers (80 %: {low:.2} to {high:.2}), by {answers} \
-             answers on {date}, at {:.0} pixels per degree",
+            "{name}: {factor:.2} times the samples of the model's observers (80 %: {low:.2} to {high:.2}), \
+             by {answers} answers on {date}, at {:.0} pixels per degree",
             display.pixels_per_degree
         )?;
     }
@@ -98,8 +98,8 @@ mod page {
             CalibrationStage::Found(found) => {
                 let [low, high] = found.interval;
                 say!(
-                    "found {:.2} times the samples of the model's observers (80 %: {low:.2} to {high:.2}) after {} \
-                     answers; the simulated observer needs {factor:.2}",
+                    "found {:.2} times the samples of the model's observers (80 %: {low:.2} to {high:.2}) \
+                     after {} answers; the simulated observer needs {factor:.2}",
                     found.factor,
                     found.answers
                 )?;

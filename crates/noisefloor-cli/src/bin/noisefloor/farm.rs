@@ -79,8 +79,8 @@ impl FarmRender {
         let here = program_digest()?;
         anyhow::ensure!(
             here == self.program,
-            "this noisefloor is another build than the one that planned the farm ({:.8}, not {:.8}), and may take \
-             other samples: run that one on every node, or plan the farm anew in another folder",
+            "this noisefloor is another build than the one that planned the farm ({:.8}, not {:.8}), \
+             and may take other samples: run that one on every node, or plan the farm anew in another folder",
             here,
             self.program
         );
@@ -355,8 +355,8 @@ impl RenderFiles for Output {
 pub fn check(job: &RenderJob) -> anyhow::Result<()> {
     if job.source.kind == SourceKind::Exr {
         bail!(
-            "pictures on disk hold the batches that they hold, and a farm plans others; `noisefloor render \
-             --source exr` plays them"
+            "pictures on disk hold the batches that they hold, and a farm plans others; \
+             `noisefloor render --source exr` plays them"
         );
     }
     match job.criterion {

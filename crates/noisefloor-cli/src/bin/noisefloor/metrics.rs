@@ -125,8 +125,8 @@ fn check_codes(job: &MetricsJob) -> anyhow::Result<()> {
     let takes_srgb = matches!(job.viewing.params().eotf, Eotf::Srgb | Eotf::Gamma(_));
     if makes_srgb && !takes_srgb {
         bail!(
-            "--viewing {}: this display takes no sRGB values, which tone mapping makes; give a LUT that \
-             makes what it takes, or PNGs that hold it",
+            "--viewing {}: this display takes no sRGB values, which tone mapping makes; \
+             give a LUT that makes what it takes, or PNGs that hold it",
             job.viewing
         );
     }

@@ -27,7 +27,7 @@ use noisefloor_cli::say::one_line;
 use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_all_on_signal};
 use noisefloor_cli::sources::{Opened, Source};
 use saving::Pace;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,97 +52,132 @@ pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
 
 /// Renders; a frame of a sequence that is resumed may be finished already.
 fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
-    // Whatever can be wrong is found before anything is rendered.
-    let began = Instant::now();
-    let RenderRun { job, resources, quiet, .. } = run;
-    let Ready { params, oracle } = job.read()?;
-    warn(job, *quiet);
-    resources.start_threads()?;
-    let opened = job.source.open(*resources)?;
-    opened.warn();
-    let Opened { mut source, scene, .. } = opened;
-    let info = source.info();
-    let SourceInfo { name, width, height, .. } = &info;
-    let against = run.against.as_deref();
-    let reference = against.map(|path| read_reference(path, (*width, *height))).transpose()?;
-    let (criterion, denoised) = match (&job.criterion, job.criterion.of(oracle.as_ref())) {
-        (_, Some(criterion)) => (criterion, None),
-        (CriterionJob::Denoised { lost, passes, device }, None) => {
-            let plan = filter_plan(device.as_deref(), resources.timeout)?;
-            let (criterion, denoised) =
-                denoised::begin(&mut source, job.source.first_hits_spp(), (*lost, *passes), plan)?;
-            (criterion, Some(denoised))
-        }
-        (_, None) => bail!("no model was read"),
-    };
-    let mut driver = Driver::new(source, criterion, params)?;
+    let Some(mut ready) = Prepared::new(run, is_frame)? else { return Ok(ExitCode::SUCCESS) };
+    let outcome = ready.sample(run);
+    ready.finish(run, outcome)
+}
 
-    // Only what can be resumed is kept
-    let mut earlier = run.earlier;
-    let folder = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(&scene), PathBuf::from);
-    if is_frame && earlier == Earlier::Resume {
-        let digest = driver.session().checkpoint(JOB).ok().map(|checkpoint| checkpoint.job_digest());
-        match finished_frame(&folder, digest.as_deref(), job)? {
-            Finished::This => return Ok(ExitCode::SUCCESS),
-            Finished::Other => bail!(
-                "{}: holds a finished picture of other options, of a scene that has changed since, or of \
-                 another \
-                 build; --force renders all frames anew, --out names another folder",
-                folder.display()
-            ),
-            Finished::Lost => earlier = Earlier::Overwrite,
-            Finished::Not => {}
+/// A render that can begin: whatever can be wrong was found.
+struct Prepared {
+    began: Instant,
+    driver: Rendering,
+    output: Output,
+    views: Views,
+    cancel: Arc<AtomicBool>,
+    /// Whether there is a checkpoint to keep.
+    keeps: bool,
+}
+
+impl Prepared {
+    /// `None` if the frame is finished already.
+    fn new(run: &RenderRun, is_frame: bool) -> anyhow::Result<Option<Self>> {
+        let began = Instant::now();
+        let RenderRun { job, resources, quiet, .. } = run;
+        let Ready { params, oracle } = job.read()?;
+        warn(job, *quiet);
+        resources.start_threads()?;
+        let opened = job.source.open(*resources)?;
+        opened.warn();
+        let Opened { mut source, scene, .. } = opened;
+        let info = source.info();
+        let SourceInfo { name, width, height, .. } = &info;
+        let against = run.against.as_deref();
+        let reference = against.map(|path| read_reference(path, (*width, *height))).transpose()?;
+        let (criterion, denoised) = match (&job.criterion, job.criterion.of(oracle.as_ref())) {
+            (_, Some(criterion)) => (criterion, None),
+            (CriterionJob::Denoised { lost, passes, device }, None) => {
+                let plan = filter_plan(device.as_deref(), resources.timeout)?;
+                let rays = job.source.first_hits_spp();
+                let (criterion, denoised) = denoised::begin(&mut source, rays, (*lost, *passes), plan)?;
+                (criterion, Some(denoised))
+            }
+            (_, None) => bail!("no model was read"),
+        };
+        let mut driver = Driver::new(source, criterion, params)?;
+
+        let folder = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(&scene), PathBuf::from);
+        let earlier = match run.earlier {
+            Earlier::Resume if is_frame => match resumed_frame(&driver, &folder, job)? {
+                Some(earlier) => earlier,
+                None => return Ok(None),
+            },
+            earlier => earlier,
+        };
+        let resume = earlier == Earlier::Resume;
+        // Only what can be resumed is kept
+        let keeps = info.repeats == Repeats::Samples && driver.session().checkpoint(JOB).is_ok();
+        if resume && info.repeats != Repeats::Samples {
+            bail!(
+                "--resume: {name} cannot be resumed, since it may repeat samples after a restart; leave it out"
+            );
         }
-    }
-    let resume = earlier == Earlier::Resume;
-    let keeps = info.repeats == Repeats::Samples && driver.session().checkpoint(JOB).is_ok();
-    if resume && info.repeats != Repeats::Samples {
-        bail!(
-            "--resume: {name} cannot be resumed, since it may repeat samples after a restart; leave it out"
-        );
-    }
-    if resume {
-        driver.session().checkpoint(JOB).context("--resume: leave it out")?;
-    }
-    let origin = job.source.origin(&scene, name, info.repeats == Repeats::Samples)?;
-    let folder = Folder::claim(folder)?;
-    let mut output = Output::create(folder, earlier, scene, name.clone(), job.clone())?;
-    output.model = oracle.map(|oracle| oracle.model().digest());
-    (output.reference, output.origin, output.denoised) = (reference, origin, denoised);
-    if resume {
-        driver = take_up(driver, &mut output, *quiet)?;
-    }
-    driver.set_time_limit(run.time.map(|time| sampling_time(time, began, width * height)));
-    let cancel = driver.cancel_flag();
-    let flags = [Some(Arc::clone(&cancel)), output.denoised.as_ref().map(|denoised| denoised.give_up())];
-    cancel_all_on_signal(flags.into_iter().flatten().collect(), AFTER_THIS_BATCH)?;
-    driver.source_mut().watch_reference(reference_bar(*quiet), Arc::clone(&cancel));
-    let mut views = Views::open(run, &output, (*width, *height))?;
-    output.seconds_setup = Some(began.elapsed().as_secs_f64());
-    let outcome = sample(&mut driver, &mut output, &mut views, keeps, run);
-    if let (Ok(()), Some(denoised)) = (&outcome, &output.denoised) {
-        // Ended between two verdicts, the denoiser answers: the last picture is denoised, too
-        denoised.give_up().store(false, Ordering::Relaxed);
+        if resume {
+            driver.session().checkpoint(JOB).context("--resume: leave it out")?;
+        }
+        let origin = job.source.origin(&scene, name, info.repeats == Repeats::Samples)?;
+        let folder = Folder::claim(folder)?;
+        let mut output = Output::create(folder, earlier, scene, name.clone(), job.clone())?;
+        output.model = oracle.map(|oracle| oracle.model().digest());
+        (output.reference, output.origin, output.denoised) = (reference, origin, denoised);
+        if resume {
+            driver = take_up(driver, &mut output, *quiet)?;
+        }
+        driver.set_time_limit(run.time.map(|time| sampling_time(time, began, width * height)));
+        let cancel = driver.cancel_flag();
+        let give_up = output.denoised.as_ref().map(|denoised| denoised.give_up());
+        let flags = [Some(Arc::clone(&cancel)), give_up];
+        cancel_all_on_signal(flags.into_iter().flatten().collect(), AFTER_THIS_BATCH)?;
+        driver.source_mut().watch_reference(reference_bar(*quiet), Arc::clone(&cancel));
+        let views = Views::open(run, &output, (*width, *height))?;
+        output.seconds_setup = Some(began.elapsed().as_secs_f64());
+        Ok(Some(Self { began, driver, output, views, cancel, keeps }))
     }
 
-    // Write what there is, also after a failure.
-    let checkpoint = snapshot(driver.session(), keeps);
-    let over = (driver.clock(), Some(driver.source().as_ref()));
-    let written = output.write(driver.session(), checkpoint, over);
-    let interrupted = finish(&driver, outcome, &cancel)?;
-    written?;
-    if !quiet {
-        output.summarise(driver.session(), driver.clock(), driver.source().as_ref())?;
-        // Of a render that was cut short, nobody knows what it would have taken
-        let mut reasons = driver.session().stops().map(|stop| stop.reason);
-        let is_whole = reasons.all(|reason| matches!(reason, StopReason::Converged | StopReason::MaxSpp));
-        let is_done = driver.session().is_done() && is_whole;
-        if is_done && matches!(job.criterion, CriterionJob::Oracle { .. }) {
-            denoised::say_what_it_would_save(driver.session(), began.elapsed())?;
+    /// Renders until it is done or cut short.
+    fn sample(&mut self, run: &RenderRun) -> Result<(), DriverError> {
+        let outcome = sample(&mut self.driver, &mut self.output, &mut self.views, self.keeps, run);
+        if let (Ok(()), Some(denoised)) = (&outcome, &self.output.denoised) {
+            // Ended between two verdicts, the denoiser answers: the last picture is denoised, too
+            denoised.give_up().store(false, Ordering::Relaxed);
         }
+        outcome
     }
-    let stopped = driver.session().stops().any(|s| s.reason == StopReason::Cancelled);
-    Ok(if stopped || interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+
+    /// Writes what there is, also after a failure, and says what became of the render.
+    fn finish(mut self, run: &RenderRun, outcome: Result<(), DriverError>) -> anyhow::Result<ExitCode> {
+        let checkpoint = snapshot(self.driver.session(), self.keeps);
+        let over = (self.driver.clock(), Some(self.driver.source().as_ref()));
+        let written = self.output.write(self.driver.session(), checkpoint, over);
+        let interrupted = finish(&self.driver, outcome, &self.cancel)?;
+        written?;
+        let session = self.driver.session();
+        if !run.quiet {
+            self.output.summarise(session, self.driver.clock(), self.driver.source().as_ref())?;
+            // Of a render that was cut short, nobody knows what it would have taken
+            let mut reasons = session.stops().map(|stop| stop.reason);
+            let is_whole = reasons.all(|reason| matches!(reason, StopReason::Converged | StopReason::MaxSpp));
+            if session.is_done() && is_whole && matches!(run.job.criterion, CriterionJob::Oracle { .. }) {
+                denoised::say_what_it_would_save(session, self.began.elapsed())?;
+            }
+        }
+        let stopped = session.stops().any(|s| s.reason == StopReason::Cancelled);
+        Ok(if stopped || interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    }
+}
+
+/// How a frame of a sequence goes on with what its folder holds; `None` if it is finished.
+fn resumed_frame(driver: &Rendering, folder: &Path, job: &RenderJob) -> anyhow::Result<Option<Earlier>> {
+    let digest = driver.session().checkpoint(JOB).ok().map(|checkpoint| checkpoint.job_digest());
+    match finished_frame(folder, digest.as_deref(), job)? {
+        Finished::This => Ok(None),
+        Finished::Other => bail!(
+            "{}: holds a finished picture of other options, of a scene that has changed since, or of another build; \
+             --force renders all frames anew, --out names another folder",
+            folder.display()
+        ),
+        Finished::Lost => Ok(Some(Earlier::Overwrite)),
+        Finished::Not => Ok(Some(Earlier::Resume)),
+    }
 }
 
 /// Says what is unwise about a job.
@@ -150,8 +185,8 @@ fn warn(job: &RenderJob, quiet: bool) {
     let tile = job.limits.tile;
     if tile < SMALL_TILE && !quiet && matches!(job.criterion, CriterionJob::Oracle { .. }) {
         note!(
-            "warning: tiles of {tile} pixels are small: people judged zones of 100 to 300, and verdicts on tiles below \
-             {SMALL_TILE} are less certain"
+            "warning: tiles of {tile} pixels are small: people judged zones of 100 to 300, \
+             and verdicts on tiles below {SMALL_TILE} are less certain"
         );
     }
 }
@@ -281,23 +316,20 @@ fn finish(driver: &Rendering, outcome: Result<(), DriverError>, cancel: &AtomicB
 fn in_a_user_s_words(fault: &Fault) -> String {
     match fault {
         Fault::Repeated { tiles, of } => format!(
-            "{tiles} of {of} tiles got the same samples twice: the renderer repeats its random numbers, or \
-             two of the \
-             pictures are one"
+            "{tiles} of {of} tiles got the same samples twice: the renderer repeats its random numbers, \
+             or two of the pictures are one"
         ),
-        Fault::Running { .. } => "its batches contain the samples of the ones before: name running means by \
-        their \
-             samples per pixel (00100.exr), and batches by their first and last sample \
-             (batch_00060_00100.exr)"
+        Fault::Running { .. } => "its batches contain the samples of the ones before: \
+        name running means by their samples per pixel (00100.exr), \
+        and batches by their first and last sample (batch_00060_00100.exr)"
             .to_owned(),
         Fault::Shared { correlation } => format!(
-            "its successive batches share samples (correlation {correlation:.2}): its seeds repeat or \
-             overlap, or its \
-             scene changes from one to the next"
+            "its successive batches share samples (correlation {correlation:.2}): \
+             its seeds repeat or overlap, or its scene changes from one to the next"
         ),
         Fault::Quantised { encoding } => format!(
-            "all values are {encoding} of 8 bits: let it write linear radiance in floating point, as EXR or \
-             PFM"
+            "all values are {encoding} of 8 bits: let it write linear radiance in floating point, \
+             as EXR or PFM"
         ),
         other => other.to_string(),
     }

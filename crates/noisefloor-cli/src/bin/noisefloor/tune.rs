@@ -362,13 +362,15 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
             report.steps.last().map_or(0.0, |step| step.each)
         ),
         Ending::Unchanged => note!(
-            "error: the finest settings, down to {name} {}, give the same pictures: the renderer does not look at the {name}, or \
-             has reached its most samples (--max-spp), or takes its fewest samples with all of them (--to tries finer ones)",
+            "error: the finest settings, down to {name} {}, give the same pictures: \
+             the renderer does not look at the {name}, or has reached its most samples (--max-spp), \
+             or takes its fewest samples with all of them (--to tries finer ones)",
             report.steps.last().map_or(0.0, |step| step.each)
         ),
         Ending::NotFalling { ratio } => note!(
-            "error: more samples do not make it better ({ratio:.2} times too much): few samples may \
-             find much of the light, a denoiser may have reached its limit, or the pictures share their random numbers"
+            "error: more samples do not make it better ({ratio:.2} times too much): \
+             few samples may find much of the light, a denoiser may have reached its limit, \
+             or the pictures share their random numbers"
         ),
         other => note!("error: the search has ended: {}", other.name()),
     }

@@ -227,8 +227,8 @@ fn oracle_params(words: &str, mut params: Params) -> anyhow::Result<Params> {
             ("min-spp", _, Ok(samples)) => params.min_spp = samples.into(),
             ("consecutive", _, Ok(verdicts)) => params.consecutive = verdicts,
             _ => refuse!(
-                "{word:?} is none of fine, schedule=spaced, batch=100, min-spp=50 and consecutive=2, or of \
-                 other numbers"
+                "{word:?} is none of fine, schedule=spaced, batch=100, min-spp=50 and consecutive=2, \
+                 or of other numbers"
             ),
         }
     }

@@ -58,7 +58,8 @@ pub(super) fn say_rated(model: &[Prediction], rated: &[RatedRival]) -> Result<()
         line(r.title, format!("{:.2e}", r.constant), r.mean_spp, &r.scores)?;
     }
     say!(
-        "Constants are those that agree with people on average; scores use the constant fitted on the other scenes. Rivals follow a \
-         rendering that is synthesised from the pictures (noise ∝ 1/√n)."
+        "Constants are those that agree with people on average; \
+         scores use the constant fitted on the other scenes. \
+         Rivals follow a rendering that is synthesised from the pictures (noise ∝ 1/√n)."
     )
 }

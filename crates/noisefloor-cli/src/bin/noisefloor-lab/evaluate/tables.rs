@@ -19,10 +19,12 @@ pub(super) fn say_scores(evaluation: &Evaluation) -> Result<(), NotSaid> {
         evaluation.calibration_error
     )?;
     say!(
-        "error = exp(mean |ln(predicted/human)|); bias = exp(mean ln(predicted/human)); early = stopped below half the human threshold.\n\
-         Thresholds are searched on {} real and {} synthesised levels; \"images right\" counts only real pictures. The factors leave out \
-         {} censored zones; {} zones are unfamiliar to the model that predicts them.\nThe scene median knows the scene's other zones, which \
-         no predictor of unseen scenes can.",
+        "error = exp(mean |ln(predicted/human)|); bias = exp(mean ln(predicted/human)); \
+         early = stopped below half the human threshold.\n\
+         Thresholds are searched on {} real and {} synthesised levels; \
+         \"images right\" counts only real pictures. The factors leave out {} censored zones; \
+         {} zones are unfamiliar to the model that predicts them.\n\
+         The scene median knows the scene's other zones, which no predictor of unseen scenes can.",
         evaluation.levels_real,
         evaluation.levels_synthesised,
         evaluation.censored_zones,

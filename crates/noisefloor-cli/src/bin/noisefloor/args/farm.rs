@@ -192,8 +192,8 @@ fn renders(typed: Vec<OsString>, frames: Option<&Frames>) -> anyhow::Result<(Far
     let absent = |frame: &&i32| frames.is_some_and(|frames| !frames.contains(**frame));
     if let Some(frame) = exposure.frames().iter().find(absent) {
         refuse!(
-            "--exposure-from: frame {frame} is not among the frames of the farm; render it first, and give \
-             its output folder"
+            "--exposure-from: frame {frame} is not among the frames of the farm; render it first, \
+             and give its output folder"
         );
     }
     let RenderRun { job, resources, out, time, against, earlier, tev, watch, .. } = run;

@@ -257,8 +257,8 @@ fn autosave(text: &str) -> Result<Autosave, String> {
 /// `render --spp 100` is what people try first.
 fn no_spp(text: &str) -> Result<String, String> {
     Err(format!(
-        "`render` stops each tile when nobody sees noise in it; for {text} samples everywhere, use --criterion \
-         spp:{text}"
+        "`render` stops each tile when nobody sees noise in it; for {text} samples everywhere, \
+         use --criterion spp:{text}"
     ))
 }
 
@@ -267,8 +267,8 @@ impl RenderArgs {
     pub fn check(self) -> anyhow::Result<RenderRun> {
         if matches!(self.exposure_from, Some(ExposureFrom::First | ExposureFrom::Frames(_))) {
             refuse!(
-                "--exposure-from: frames need --frames; a single render takes the exposure of another \
-                 render, by its output folder"
+                "--exposure-from: frames need --frames; \
+                 a single render takes the exposure of another render, by its output folder"
             );
         }
         self.check_one()

@@ -117,8 +117,9 @@ pub struct TuneArgs {
 /// `tune --spp 100` is what people try first.
 fn no_spp(text: &str) -> Result<String, String> {
     Err(format!(
-        "`tune` finds how many samples are needed: --knob samples looks for their number, up to --to {text}, and \
-         --max-spp {text} bounds a picture with a threshold. `render --criterion spp:{text}` takes {text} everywhere"
+        "`tune` finds how many samples are needed: --knob samples looks for their number, \
+         up to --to {text}, and --max-spp {text} bounds a picture with a threshold. \
+         `render --criterion spp:{text}` takes {text} everywhere"
     ))
 }
 

@@ -71,15 +71,16 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
     let pair = SnapshotPair::new(Evidence::Halves, &a, &[&b], job.tone.clone(), job.samples)?;
     if pair.samples() == Samples::Nested {
         bail!(
-            "--denoised needs two halves that share no samples, and these are snapshots of one rendering: the later one contains \
-             the earlier one. Render one with another seed and denoise it again; --independent overrides what was found"
+            "--denoised needs two halves that share no samples, and these are snapshots of one rendering: \
+             the later one contains the earlier one. Render one with another seed and denoise it again; \
+             --independent overrides what was found"
         );
     }
     warn_of(&pair.notice(TileGrid::new(a.size.0, a.size.1, job.tile)?)?.warnings);
     if a.spp.max(b.spp) > 2.0 * a.spp.min(b.spp) {
         note!(
-            "note: one picture has more than twice the samples of the other ({} and {}): the verdict is on the mean of the two \
-             denoised pictures, and the worse one dominates it",
+            "note: one picture has more than twice the samples of the other ({} and {}): \
+             the verdict is on the mean of the two denoised pictures, and the worse one dominates it",
             a.spp,
             b.spp
         );

@@ -185,8 +185,9 @@ impl Output {
         }
         if let Some(lost) = jods_lost {
             say!(
-                "the worst tile has lost {lost:.3} JOD, by an estimate that 19 of 20 tiles exceed by less than \
-                 ×{ESTIMATE_ERRS_BY}; nobody has been asked about denoised tiles"
+                "the worst tile has lost {lost:.3} JOD, \
+                 by an estimate that 19 of 20 tiles exceed by less than ×{ESTIMATE_ERRS_BY}; \
+                 nobody has been asked about denoised tiles"
             )?;
         }
         say!(

@@ -49,9 +49,8 @@ impl Output {
         let (least, most) = (spp.iter().min().unwrap_or(&0), spp.iter().max().unwrap_or(&0));
         let range = if least == most { format!("{most}") } else { format!("{least} to {most}") };
         say!(
-            "{satisfied} of {} tiles {as_wanted}, after {range} samples per pixel ({:.0} on average: {:.0} \
-             % of uniform \
-             rendering at {most})",
+            "{satisfied} of {} tiles {as_wanted}, after {range} samples per pixel ({:.0} on average: \
+             {:.0} % of uniform rendering at {most})",
             spp.len(),
             samples / (grid.width() * grid.height()) as f64,
             100.0 * samples / uniform_samples(session).max(1) as f64,
@@ -69,8 +68,8 @@ impl Output {
         }
         if let Some(threshold) = typical_threshold(session) {
             say!(
-                "in the typical tile, 10 % of people see no noise from {} samples per pixel on, 90 % from {}; tiles stop \
-                 where --people of them do",
+                "in the typical tile, 10 % of people see no noise from {} samples per pixel on, \
+                 90 % from {}; tiles stop where --people of them do",
                 threshold.low,
                 threshold.high
             )?;
@@ -81,15 +80,17 @@ impl Output {
         let unmet = unmet_tiles(session);
         if unmet > 0 {
             say!(
-                "tiles that only light keeps from being done which they may not have met: {unmet}; only one half of the \
-                 samples has met it elsewhere, and as much would be seen if it fell on them"
+                "tiles that only light keeps from being done which they may not have met: {unmet}; \
+                 only one half of the samples has met it elsewhere, \
+                 and as much would be seen if it fell on them"
             )?;
         }
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
             say!(
-                "tiles with texture or light unlike any that the model was tested on: {unfamiliar}; they get up to twice \
-                 the samples it asks for, up to --max-spp, and their verdicts are less certain"
+                "tiles with texture or light unlike any that the model was tested on: {unfamiliar}; \
+                 they get up to twice the samples it asks for, up to --max-spp, \
+                 and their verdicts are less certain"
             )?;
         }
         Ok(())

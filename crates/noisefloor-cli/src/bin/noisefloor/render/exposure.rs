@@ -71,8 +71,8 @@ impl SequenceExposure {
         if *typed && !kept.is_empty() && !kept.iter().map(|key| &key.frame).eq(frames) {
             let of: Vec<String> = kept.iter().map(|key| key.frame.to_string()).collect();
             bail!(
-                "{} has the exposure of frame {}, which the frames that are there have: leave out \
-                 --exposure-from, or render all frames again with --force",
+                "{} has the exposure of frame {}, which the frames that are there have: \
+                 leave out --exposure-from, or render all frames again with --force",
                 path.display(),
                 of.join(", ")
             );

@@ -100,8 +100,8 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
             let exposure = report.and_then(|report| report.exposure);
             let exposure = exposure.with_context(|| {
                 format!(
-                    "frame {frame} ended before its exposure was known, which other frames are to have: give \
-                     it more --time, or give --exposure"
+                    "frame {frame} ended before its exposure was known, which other frames are to have: \
+                     give it more --time, or give --exposure"
                 )
             })?;
             found.push(KeyExposure { frame, exposure });
@@ -126,12 +126,13 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
 }
 
 /// What is unwise about one seed for all frames.
-pub const ONE_SEED: &str = "with one seed for all frames, their noise stands still on the screen, like dirt on the lens: it takes about three \
-     times the samples to vanish. Leave out --same-seed";
+pub const ONE_SEED: &str = "with one seed for all frames, their noise stands still on the screen, \
+     like dirt on the lens: it takes about three times the samples to vanish. Leave out --same-seed";
 
 /// What is unwise about an exposure for each frame.
-pub const EACH: &str = "each frame settles an exposure of its own. Those of frames that differ by noise \
-     alone differ by several percent, and the film flickers: leave out --exposure-from each";
+pub const EACH: &str = "each frame settles an exposure of its own. \
+     Those of frames that differ by noise alone differ by several percent, and the film flickers: \
+     leave out --exposure-from each";
 
 /// Says what is unwise about a sequence.
 fn warn(sequence: &SequenceRun) {
@@ -145,8 +146,8 @@ fn warn(sequence: &SequenceRun) {
     let in_film = job.frames_per_second.or(job.viewing.and_then(|viewing| viewing.frames_per_second()));
     if in_film.is_none() && !job.source.same_seed && matches!(job.criterion, CriterionJob::Oracle { .. }) {
         note!(
-            "each frame is judged as a still; as a frame of a film, whose noise is new in each, it needs about half of \
-             the samples or less: --fps 24"
+            "each frame is judged as a still; as a frame of a film, whose noise is new in each, \
+             it needs about half of the samples or less: --fps 24"
         );
     }
     if sequence.exposure.frames().is_empty() && job.tone.settles() {

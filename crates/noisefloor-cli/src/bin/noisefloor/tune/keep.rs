@@ -34,8 +34,8 @@ impl Keep {
         let folder = Folder::claim(path)?;
         if let (Earlier::Keep, Some(file)) = (earlier, folder.first_of(FILES)) {
             refuse!(
-                "{}: holds {file} of an earlier run; --resume goes on with a search, --force overwrites it, --keep \
-                 names another folder",
+                "{}: holds {file} of an earlier run; --resume goes on with a search, --force overwrites it, \
+                 --keep names another folder",
                 folder.path().display()
             );
         }

@@ -104,8 +104,8 @@ impl View {
         let ((width, height), before) = (pair.size, *self.size.get_or_insert(pair.size));
         if pair.size != before {
             bail!(
-                "the renderer's pictures have {width}×{height} pixels now, and had {}×{} before: what is seen in one says \
-                 nothing of the other; render all with one size",
+                "the renderer's pictures have {width}×{height} pixels now, and had {}×{} before: \
+                 what is seen in one says nothing of the other; render all with one size",
                 before.0,
                 before.1
             );
@@ -338,8 +338,8 @@ impl<'a> Judges<'a> {
         let halves = PicturePair::new(size, pictures.clone(), spp.unwrap_or(128.0));
         let halves = halves.map_err(|error| match error {
             StillError::Same => anyhow::anyhow!(
-                "two pictures of different seeds are the same: the renderer does not look at the seed, or the scene \
-                 has no noise"
+                "two pictures of different seeds are the same: the renderer does not look at the seed, \
+                 or the scene has no noise"
             ),
             other => other.into(),
         })?;
