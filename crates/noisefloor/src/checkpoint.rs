@@ -92,7 +92,7 @@ pub enum CheckpointError {
     /// as new.
     #[error("{0} cannot be resumed: it does not promise new samples after a restart")]
     Source(String),
-    /// The criterion does not say its state ([`StoppingCriterion::state`](crate::StoppingCriterion::state)).
+    /// The criterion does not say its state ([`StoppingCriterion::state`]).
     #[error("a render stopped by {0} cannot be resumed: this criterion does not keep its state")]
     Criterion(String),
 }

@@ -330,7 +330,7 @@ pub struct Rendering<'a> {
     pub rounding: f32,
 }
 
-/// How two pictures of one scene were made from samples, for [`residual_scale`].
+/// How two pictures of one scene were made from samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Samples {
     /// They share no samples.

@@ -668,7 +668,7 @@ impl<C: StoppingCriterion> Session<C> {
     }
 
     /// How visible the noise is at each pixel of the image, row-major, as a multiple of what is just seen
-    /// (see [`crate::Oracle::map_visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
+    /// ([`StoppingCriterion::visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
     /// before the display is settled, or if the criterion cannot say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
         let view = View::of(&self.film, &self.display, &self.params, &self.displayed_reference)?;
