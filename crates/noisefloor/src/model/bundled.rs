@@ -33,12 +33,12 @@ fn parts(from: &mut Payload) -> ModelParts {
     });
     let descriptor = Descriptor::from_spec(&named.remove(0), &[]).expect("a built-in descriptor");
     assert_eq!(from.whole(), u64::from(descriptor.version()), "the version of the descriptor");
-    from.first_variant("evidence from halves");
-    from.first_variant("Reinhard's operator");
-    let tone_mapping = ToneMapping::Reinhard { key: from.single(), white: from.option(Payload::single) };
+    from.variant(0, "evidence from halves");
+    from.variant(1, "plain sRGB, as the pictures are shown that people judged");
+    let tone_mapping = ToneMapping::Srgb { exposure: from.single() };
     let viewing = viewing(from);
     let scaler = Scaler { mean: from.list(Payload::single), scale: from.list(Payload::single) };
-    from.first_variant("a line");
+    from.variant(0, "a line");
     let machine = Machine::Line(Line { weights: from.list(Payload::single), bias: from.single() });
     let platt = Platt { a: from.single(), b: from.single() };
     ModelParts {
@@ -81,8 +81,8 @@ fn viewing(from: &mut Payload) -> Viewing {
     ] {
         *number = from.double();
     }
-    from.first_variant("sRGB");
-    from.first_variant("Rec.709");
+    from.variant(0, "sRGB");
+    from.variant(0, "Rec.709");
     (params.eotf, params.primaries) = (Eotf::Srgb, Primaries::Rec709);
     params.check().expect("the viewing conditions of a model")
 }
@@ -130,8 +130,8 @@ impl Payload {
     }
 
     /// Reads which variant of an enumeration follows.
-    fn first_variant(&mut self, what: &str) {
-        assert_eq!(self.whole(), 0, "{what}");
+    fn variant(&mut self, number: u64, what: &str) {
+        assert_eq!(self.whole(), number, "{what}");
     }
 }
 
