@@ -248,6 +248,9 @@ typedef struct {
     uint32_t reason;
     // Whether the tile's texture is unlike all that the model was trained on: treat the verdict with care.
     bool unfamiliar;
+    // Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would
+    // be seen here.
+    bool unmet;
 } NfTileState;
 
 // What samples were like that were pushed.

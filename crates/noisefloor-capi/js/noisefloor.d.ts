@@ -146,6 +146,8 @@ export interface TileState {
   reason: "open" | "converged" | "maxSpp" | "timeLimit" | "cancelled" | "failed";
   /** Whether the texture is unlike all that the model was trained on: treat the verdict with care. */
   unfamiliar: boolean;
+  /** Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would be seen here. */
+  unmet: boolean;
 }
 
 /** How pixels lie in an array. */

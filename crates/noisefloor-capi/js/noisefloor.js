@@ -96,7 +96,7 @@ STRUCTS.NfParams = struct(
 STRUCTS.NfTile = struct("size_t index; size_t x; size_t y; size_t width; size_t height");
 STRUCTS.NfRequest = struct("NfTile tile; uint64_t first; uint64_t spp; uint32_t sequence; uint64_t point");
 STRUCTS.NfTileState = struct(
-  "uint64_t spp; uint64_t expected_spp; float probability; uint32_t reason; bool unfamiliar",
+  "uint64_t spp; uint64_t expected_spp; float probability; uint32_t reason; bool unfamiliar; bool unmet",
 );
 STRUCTS.NfSampleCounts = struct("uint64_t rejected; uint64_t negative; size_t warnings");
 
@@ -616,6 +616,7 @@ export class Session {
       probability: Number.isNaN(state.probability) ? null : state.probability,
       reason: REASONS[state.reason],
       unfamiliar: state.unfamiliar,
+      unmet: state.unmet,
     }));
   }
 

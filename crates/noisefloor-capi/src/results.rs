@@ -36,6 +36,9 @@ pub struct NfTileState {
     pub reason: u32,
     /// Whether the tile's texture is unlike all that the model was trained on: treat the verdict with care.
     pub unfamiliar: bool,
+    /// Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would
+    /// be seen here.
+    pub unmet: bool,
 }
 
 fn reason_code(reason: StopReason) -> u32 {
@@ -70,6 +73,7 @@ pub unsafe extern "C" fn nf_session_states(
                 probability: verdict.and_then(|v| v.probability).unwrap_or(f32::NAN),
                 reason: NF_REASON_OPEN,
                 unfamiliar: verdict.is_some_and(|v| v.unfamiliar),
+                unmet: verdict.is_some_and(|v| v.unmet),
             };
         }
         for stop in locked.stops() {

@@ -189,6 +189,9 @@ pub(crate) struct PyVerdict {
     threshold: Option<Points>,
     /// Whether the tile is unlike all that the model was trained on: treat the verdict with care.
     unfamiliar: bool,
+    /// Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would
+    /// be seen here.
+    unmet: bool,
 }
 
 #[pymethods]
@@ -201,13 +204,14 @@ impl PyVerdict {
         expected_spp: Option<u64>,
         threshold: Option<Points>,
         unfamiliar: bool,
+        unmet: bool,
     ) -> Self {
-        Self { tile, converged, probability, expected_spp, threshold, unfamiliar }
+        Self { tile, converged, probability, expected_spp, threshold, unfamiliar, unmet }
     }
 
-    fn __getnewargs__(&self) -> (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool) {
-        let Self { tile, converged, probability, expected_spp, threshold, unfamiliar } = *self;
-        (tile, converged, probability, expected_spp, threshold, unfamiliar)
+    fn __getnewargs__(&self) -> (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool, bool) {
+        let Self { tile, converged, probability, expected_spp, threshold, unfamiliar, unmet } = *self;
+        (tile, converged, probability, expected_spp, threshold, unfamiliar, unmet)
     }
 
     fn __repr__(&self) -> String {
@@ -219,9 +223,9 @@ impl PyVerdict {
 
 impl PyVerdict {
     pub(crate) fn of(tile: Tile, verdict: Verdict) -> Self {
-        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
+        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, unmet, .. } = verdict;
         let threshold = threshold.map(|t| (t.low, t.median, t.high));
-        Self { tile: tile.into(), converged, probability, threshold, expected_spp, unfamiliar }
+        Self { tile: tile.into(), converged, probability, threshold, expected_spp, unfamiliar, unmet }
     }
 }
 
