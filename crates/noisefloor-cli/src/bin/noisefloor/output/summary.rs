@@ -1,6 +1,7 @@
 //! A render in a few lines, for people.
 
 use super::{CHECKPOINT, Output, typical_threshold, uniform_samples, unmet_tiles};
+use crate::job::CriterionJob;
 use noisefloor::{Audience, Session, driver::Clock};
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_cli::sources::Source;
@@ -67,9 +68,15 @@ impl Output {
             )?;
         }
         if let Some(threshold) = typical_threshold(session) {
+            let stop = match self.job.criterion {
+                CriterionJob::Oracle { people, .. } => {
+                    format!("; tiles stop where {people} of them see none")
+                }
+                _ => String::new(),
+            };
             say!(
                 "in the typical tile, 10 % of people see no noise from {} samples per pixel on, \
-                 90 % from {}; tiles stop where --people of them do",
+                 90 % from {}{stop}",
                 threshold.low,
                 threshold.high
             )?;
