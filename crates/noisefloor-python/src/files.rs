@@ -3,7 +3,9 @@
 use crate::arrays::{Encoding, Picture, array3, picture};
 use crate::errors::{ParameterError, Raise};
 use noisefloor::{Rgb, display::srgb_encode};
-use noisefloor_image::{DisplayImage, LinearImage, RenderLayers, read_picture, write_exr, write_png};
+use noisefloor_image::{
+    DisplayImage, LinearImage, ReadOptions, RenderLayers, read_picture_with, write_exr, write_png,
+};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -11,12 +13,19 @@ use std::path::{Path, PathBuf};
 ///
 /// pixels have shape (height, width, 3): of EXR and PFM float32, linear radiance as it is in the file, and
 /// encoding is "linear"; of PNG uint8 or uint16, and encoding is "srgb". The content tells the format. Alpha
-/// and further layers are left out. Pictures of more than 2**28 pixels are refused before memory is taken.
+/// and further layers are left out: layer names the one of an EXR that is read, as "ViewLayer.Combined" or the end of
+/// it; by default the unnamed one, or one named as renderers name the picture. Pictures of more than 2**28 pixels are refused before memory is taken.
 ///
 /// Raises OSError if the file cannot be read, PictureError if it is broken, too large, or something else.
 #[pyfunction]
-pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyAny>, &'static str)> {
-    match py.detach(|| read_picture(&path)).map_err(Raise::raise)? {
+#[pyo3(signature = (path, *, layer = None))]
+pub(crate) fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    layer: Option<String>,
+) -> PyResult<(Bound<'_, PyAny>, &'static str)> {
+    let options = ReadOptions { layer, ..ReadOptions::default() };
+    match py.detach(|| read_picture_with(&path, &options)).map_err(Raise::raise)? {
         noisefloor_image::Picture::Linear(LinearImage { width, height, pixels }) => {
             Ok((picture(py, (width, height), pixels)?.into_any(), Encoding::Linear.name()))
         }

@@ -245,10 +245,18 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
   await shot(page, "explore-large");
 
   // Retrain, with progress, scores before and after, and the new model in use
+  // A line is learned sooner than anybody sees: until it is looked at, the page is told that it is at a step
+  const running = { state: "running", done: 1, of: 3, doing: "one scene left out" };
+  let held = true;
+  await page.route("**/api/retrain", (route) =>
+    held && route.request().method() === "GET" ? route.fulfill({ json: running }) : route.continue(),
+  );
   await focus(/^retrain/, "Shift+Tab");
   await page.keyboard.press("Enter");
   await page.locator("#progress").waitFor();
+  await page.getByText("2 of 3: one scene left out").waitFor();
   await shot(page, "explore-working");
+  held = false;
   await page.getByText("People of the table").waitFor({ timeout: 120000 });
   await accessible(page, "learned");
   const outcome = await page.locator("#outcome").innerText();
@@ -273,7 +281,8 @@ test("everything goes by keyboard alone, in a large window", async (t) => {
 });
 
 test("pictures are enlarged, brightened and set beside one another, by keyboard", async (t) => {
-  const { page } = await open(t, EXPLORER, LARGE);
+  // Without a word about their samples, the pictures are refused at first
+  const { page } = await open(t, EXPLORER, LARGE, { refusals: true });
   await empty(page);
   await drop(page, stack);
   await page.getByText("do not show whether").waitFor();
@@ -336,6 +345,26 @@ test("pictures are enlarged, brightened and set beside one another, by keyboard"
   );
   await shot(page, "explore-split");
   await page.keyboard.press("s");
+
+  // One map at a time: of visible noise, or of JODs lost, which are fewer with more samples
+  await page.keyboard.press("n");
+  await until("the noise is shown", () => page.locator("#noise").isVisible());
+  await page.keyboard.press("j");
+  await until("the JODs are shown", () => page.locator("#lost").isVisible());
+  assert.ok(await page.locator("#noise").isHidden());
+  await page.getByText("0.1 JOD").waitFor();
+  const first = await mean("#lost");
+  await shot(page, "explore-lost");
+  await accessible(page, "JODs lost");
+  await page.locator("#level").fill("1");
+  await until("the other picture has lost less", async () =>
+    (await page.locator("#lost").isVisible()) && (await mean("#lost"))[0] < first[0] - 5,
+  );
+  await page.locator("#level").fill("0");
+  await until("the first is drawn again", async () => (await mean("#lost"))[0] === first[0]);
+  await page.locator("#stage").focus();
+  await page.keyboard.press("j");
+  await until("no map is shown", () => page.locator("#lost").isHidden());
 
   // Samples per pixel over the tiles
   await page.keyboard.press("m");

@@ -16,7 +16,15 @@ use noisefloor_study::simulated::{Public, SpreadShape};
 use std::sync::Arc;
 
 fn public(shape: SpreadShape, within: f64, lapse: f64) -> Public {
-    Public { thresholds: vec![vec![1000.0, 2500.0]], shape, between: 0.25, within, lapse, bias: 0.0 }
+    Public {
+        thresholds: vec![vec![1000.0, 2500.0]],
+        shape,
+        between: 0.25,
+        by_place: 0.0,
+        within,
+        lapse,
+        bias: 0.0,
+    }
 }
 
 /// Levels that grow by a factor of 1.35, from 10 on, as an ordinary study has them.

@@ -43,8 +43,15 @@ fn main() {
         for (within, lapse, bias) in [(0.1, 0.0, 0.0), (0.1, 0.02, 0.0), (0.25, 0.02, 0.0), (0.1, 0.02, 0.2)]
         {
             let thresholds = vec![vec![1000.0, 2500.0]];
-            let public =
-                Public { thresholds, shape: SpreadShape::Logistic, between: 0.25, within, lapse, bias };
+            let public = Public {
+                thresholds,
+                shape: SpreadShape::Logistic,
+                between: 0.25,
+                by_place: 0.0,
+                within,
+                lapse,
+                bias,
+            };
             let (_dir, pointing) = study("acquisition", &levels, "");
             let (error, clicks) = precision(&pointing, &public);
             println!("{name}, within {within}, slips {lapse}, bias {bias}");

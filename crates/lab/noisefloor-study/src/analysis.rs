@@ -14,10 +14,12 @@ pub mod raw;
 mod report;
 pub mod screening;
 mod shapes;
+mod spread;
 mod summary;
 pub mod tiles;
 
 pub use agreement::{BetweenObservers, RepeatAgreement};
 pub use observers::Observer;
 pub use report::{AnalysisOptions, ClassRow, GroupLine, ObserverRow, StudyReport, analyse, report};
+pub use spread::{PeopleSpread, spreads};
 pub use tiles::{CorpusThreshold, TileRow};

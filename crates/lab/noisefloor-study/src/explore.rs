@@ -57,7 +57,7 @@ impl ExploreServer {
         let names = told_apart(&setup.pictures.iter().map(PathBuf::as_path).collect::<Vec<_>>());
         for (path, name) in setup.pictures.iter().zip(names) {
             gallery
-                .add(GalleryPicture::read(path)?.called(name))
+                .add(GalleryPicture::read(path, setup.layer.as_deref())?.called(name))
                 .map_err(|error| StudyError::Explore(error.to_string()))?;
         }
         let kept = Arc::new(Disagreements::open(&setup.database)?);
@@ -100,6 +100,7 @@ fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
         .route("/api/pictures/{name}", post(api::add).put(api::change).delete(api::remove))
         .route("/api/pictures/{name}/shown.png", get(api::shown))
         .route("/api/pictures/{name}/noise.png", get(api::noise))
+        .route("/api/pictures/{name}/lost.png", get(api::lost))
         .route("/api/verdicts", post(ask::verdicts))
         .route("/api/disagreements", post(ask::disagree))
         .route("/api/disagreements/{id}", delete(ask::take_back))

@@ -8,13 +8,20 @@ use noisefloor_study::{ParticipantSession, Plan, Study, grids};
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// A study of one stack with two tiles. The pictures are grey: simulated observers do not look at them.
+/// A study of one stack with two tiles.
+#[allow(dead_code, reason = "not every example has two tiles")]
 pub(crate) fn study(protocol: &str, levels: &[u64], extra: &str) -> (TempDir, Arc<Study>) {
+    study_of(protocol, levels, 2, extra)
+}
+
+/// A study of one stack with so many tiles. The pictures are grey: simulated observers do not look at them.
+pub(crate) fn study_of(protocol: &str, levels: &[u64], tiles: usize, extra: &str) -> (TempDir, Arc<Study>) {
     let dir = tempfile::tempdir().expect("a temporary folder");
     let stack = dir.path().join("wall");
     std::fs::create_dir(&stack).expect("a folder for the stack");
     for spp in levels {
-        write_png(stack.join(format!("{spp:05}.png")), 32, 16, &[128; 3 * 32 * 16]).expect("a picture");
+        let grey = vec![128; 3 * 16 * tiles * 16];
+        write_png(stack.join(format!("{spp:05}.png")), 16 * tiles, 16, &grey).expect("a picture");
     }
     let text = format!(
         "protocol = \"{protocol}\"\ndatabase = \"answers.sqlite\"\ntile = 16\n{extra}\n\
@@ -27,11 +34,13 @@ pub(crate) fn study(protocol: &str, levels: &[u64], extra: &str) -> (TempDir, Ar
     (dir, Arc::new(study))
 }
 
+#[allow(dead_code, reason = "not every example has these")]
 /// The paper's hundred levels: 100 to 10 000 samples per pixel.
 pub(crate) fn papers_levels() -> Vec<u64> {
     (1..=100).map(|i| 100 * i).collect()
 }
 
+#[allow(dead_code, reason = "not every example has this")]
 /// The analysis of a study by simulated observers, and the observers.
 pub(crate) fn simulate(
     study: &Arc<Study>,

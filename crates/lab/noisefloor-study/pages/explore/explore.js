@@ -24,6 +24,8 @@ let level = 0;
 let view = null;
 let retrained = false;
 let shown = "";
+/** The picture whose map of JODs is drawn, if it is. */
+let lost = null;
 let turn = 0;
 /** What Undo takes back, the last answer last; and the number that each answer has by now, by picture and tile. */
 const undoable = [];
@@ -163,10 +165,8 @@ async function draw(picture, order) {
   if (!shown.startsWith(picture.id)) {
     const noise = view.has_noise_map ? await server.image(picture.id, "noise", turn) : null;
     if (order !== turn) return;
-    if (noise) {
-      [get("noise").width, get("noise").height] = [noise.width, noise.height];
-      get("noise").getContext("2d", { alpha: false }).drawImage(noise, 0, 0);
-    }
+    if (noise) overlay("noise", noise);
+    lost = null;
     get("frame").hidden = false;
     await viewer.show(picture, levels, turn);
     if (order !== turn) return;
@@ -180,14 +180,19 @@ async function draw(picture, order) {
   for (const id of ["verdict", "view", "answers", "yours", "learn", "frame"]) get(id).hidden = false;
   fit();
   grid.show(view, viewer.zoom);
-  layers();
   summarise();
+  await layers();
   await line.show(question());
+}
+
+function overlay(id, bitmap) {
+  [get(id).width, get(id).height] = [bitmap.width, bitmap.height];
+  get(id).getContext("2d", { alpha: false }).drawImage(bitmap, 0, 0);
 }
 
 function fit() {
   const { width, height } = get("picture");
-  for (const id of ["picture", "beside", "noise", "frame"]) {
+  for (const id of ["picture", "beside", "noise", "lost", "frame"]) {
     get(id).style.width = `${(width * viewer.zoom) / devicePixelRatio}px`;
     get(id).style.height = `${(height * viewer.zoom) / devicePixelRatio}px`;
   }
@@ -199,14 +204,48 @@ function resized() {
   summarise();
 }
 
-function layers() {
-  const noise = view.has_noise_map && get("show-noise").checked;
-  get("noise").hidden = !noise;
-  get("legend").hidden = !noise;
+/** What each map is drawn from, to, and what lies in the middle. */
+const MAPS = {
+  noise: () => ["¼", t.seen, "4", t.legend],
+  lost: () => ["0.01", t.lost_middle, "1", t.legend_lost],
+};
+
+/** Shows what is ticked. The map of JODs takes a moment, and is asked for when it is wanted. */
+async function layers() {
   get("show-noise").disabled = !view.has_noise_map;
+  const map = ["noise", "lost"].find((id) => !get(`show-${id}`).disabled && get(`show-${id}`).checked);
   get("tiles").classList.toggle("bare", !get("show-verdicts").checked);
   get("tiles").classList.toggle("needs", get("show-need").checked);
+  if (map === "lost" && lost === null) {
+    const { id } = levels[level];
+    const order = turn;
+    get("lost").hidden = true;
+    say(t.comparing);
+    try {
+      const bitmap = await server.image(id, "lost", turn);
+      if (order !== turn) return;
+      overlay("lost", bitmap);
+      lost = id;
+    } finally {
+      if (get("status").textContent === t.comparing) say("");
+    }
+  }
+  for (const id of Object.keys(MAPS)) get(id).hidden = id !== map;
+  get("legend").hidden = !map;
+  if (!map) return;
+  const [low, middle, high, label] = MAPS[map]();
+  get("legend-low").textContent = low;
+  get("legend-middle").textContent = middle;
+  get("legend-high").textContent = high;
+  get("scale").setAttribute("aria-label", label);
 }
+
+/** Ticks a layer or not; of the two maps, one is seen at a time. */
+const tick = does(async (id) => {
+  const other = { "show-noise": "show-lost", "show-lost": "show-noise" }[id];
+  if (other && get(id).checked) get(other).checked = false;
+  await layers();
+});
 
 function summarise() {
   const { tiles } = view;
@@ -316,7 +355,8 @@ function listen() {
       await look();
     }),
   );
-  for (const id of ["show-verdicts", "show-noise", "show-need"]) get(id).addEventListener("change", layers);
+  for (const id of ["show-verdicts", "show-noise", "show-lost", "show-need"])
+    get(id).addEventListener("change", () => tick(id));
   get("undo").addEventListener("click", undo);
   document.addEventListener("dragover", (event) => {
     event.preventDefault();
@@ -342,10 +382,10 @@ function listen() {
       !view
     )
       return;
-    const box = { v: "show-verdicts", n: "show-noise", m: "show-need" }[event.key.toLowerCase()];
+    const box = { v: "show-verdicts", n: "show-noise", j: "show-lost", m: "show-need" }[event.key.toLowerCase()];
     if (box && !get(box).disabled) {
       get(box).checked = !get(box).checked;
-      layers();
+      tick(box);
     } else if (viewer.key(event.key)) {
       event.preventDefault();
     }

@@ -3,6 +3,7 @@
 use super::plots;
 use super::report::ClassRow;
 use super::report::StudyReport;
+use super::spread::PeopleSpread;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::config::Study;
 use crate::error::StudyError;
@@ -144,14 +145,38 @@ impl Page {
             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
              <meta name=\"viewport\" content=\"width=device-width\"><title>noisefloor-lab study analyse</title>\n\
              <style>body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }}\n\
-             img {{ max-width: 100%; height: auto }}</style></head>\n<body>\n<h1>{} {who}</h1>\n\
+             img {{ max-width: 100%; height: auto }}\n\
+             th, td {{ text-align: left; font-weight: normal; padding: 0 1rem 0 0; vertical-align: top }}</style></head>\n<body>\n<h1>{} {who}</h1>\n\
              <p>{left} of them excluded. <a href=\"observers.csv\">observers.csv</a>, \
-             <a href=\"report.json\">report.json</a></p>\n{}</body></html>\n",
+             <a href=\"report.json\">report.json</a></p>\n{}{}</body></html>\n",
             report.observers.len(),
+            spread(report),
             self.0
         );
         Ok(write_atomic(dir.join("index.html"), |to| to.write_all(page.as_bytes()))?)
     }
+}
+
+/// The spread of people, as a table.
+fn spread(report: &StudyReport) -> String {
+    if report.spread.is_empty() {
+        return String::new();
+    }
+    let row = |s: &PeopleSpread| {
+        let name = s.stack.as_deref().map_or("all".to_owned(), escaped);
+        let interval = s.interval.map_or("none".to_owned(), |[low, high]| format!("{low:.2} to {high:.2}"));
+        let PeopleSpread { observers, tiles, people, common, by_place, within, .. } = s;
+        format!(
+            "<tr><th>{name}</th><td>{observers}</td><td>{tiles}</td><td>{people:.2}</td><td>{interval}</td>\
+             <td>{common:.2}</td><td>{by_place:.2}</td><td>{within:.2}</td></tr>\n"
+        )
+    };
+    let rows: String = report.spread.iter().map(row).collect();
+    format!(
+        "<section>\n<h2>How far people lie from each other, in ln(samples)</h2>\n<table>\n<tr><th>stack</th>\
+         <th>observers</th><th>tiles</th><th>people, one place</th><th>95 % interval</th><th>in all tiles</th>\
+         <th>by tile</th><th>by showing</th></tr>\n{rows}</table>\n</section>\n"
+    )
 }
 
 /// Text as HTML has it.

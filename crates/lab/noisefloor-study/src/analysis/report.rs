@@ -4,6 +4,7 @@ use super::agreement::{self, BetweenObservers, RepeatAgreement};
 use super::interval::{Share, bootstrap};
 use super::observers::{self, Observer, places};
 use super::screening;
+use super::spread::{PeopleSpread, spreads};
 use super::tiles::{self, TileRow};
 use crate::config::{Study, StudyProtocol};
 use crate::error::StudyError;
@@ -42,6 +43,9 @@ pub struct StudyReport {
     pub repeats: Option<RepeatAgreement>,
     /// Agreement of the observers with each other.
     pub between: Option<BetweenObservers>,
+    /// How far single people lie from each other, over all stacks and in each; empty unless several observers saw
+    /// tiles twice.
+    pub spread: Vec<PeopleSpread>,
     /// Thresholds of each group against the first one (Takouachet et al. 2017, §7.3).
     pub groups: Vec<GroupLine>,
     /// Validation: the paper's Table 2.
@@ -78,6 +82,7 @@ pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -
         tiles: if thresholds { tiles::rows(study, &kept, options.seed) } else { Vec::new() },
         repeats: agreement::repeats(study, &kept),
         between: agreement::between(study, &kept),
+        spread: if thresholds { spreads(study, &kept) } else { Vec::new() },
         groups: if thresholds { group_lines(study, &kept) } else { Vec::new() },
         classes: class_rows(&kept, options.seed),
         observers: rows,

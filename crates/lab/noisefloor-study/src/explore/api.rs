@@ -4,7 +4,7 @@ use super::answers::Disagreements;
 use super::app::App;
 use super::gallery::{GalleryError, GalleryPicture, PictureView};
 use super::images;
-use super::verdicts::Tiles;
+use super::verdicts::{Tiles, jods_lost};
 use crate::error::{StoreError, StudyError};
 use axum::Json;
 use axum::body::Body;
@@ -157,7 +157,8 @@ pub(crate) async fn add(State(app): Shared, name: Named, headers: HeaderMap, bod
         let path = folder.path().join(&of);
         std::fs::write(&path, &bytes).map_err(|e| unreadable(&e, folder.path()))?;
         drop(bytes);
-        let picture = GalleryPicture::read(&path).map_err(|e| unreadable(&e, folder.path()))?;
+        let layer = worker.setup.layer.as_deref();
+        let picture = GalleryPicture::read(&path, layer).map_err(|e| unreadable(&e, folder.path()))?;
         let id = picture.id.clone();
         worker.gallery().add(picture)?;
         Ok(id)
@@ -252,6 +253,22 @@ pub(crate) async fn noise(State(app): Shared, id: Named) -> Answer {
         ));
     }
     png(move || images::noise(&tiles).unwrap_or_else(|| Ok(Vec::new()))).await
+}
+
+/// `GET /api/pictures/{id}/lost.png`: the map of JODs lost.
+pub(crate) async fn lost(State(app): Shared, id: Named) -> Answer {
+    let Path(id) = id.map_err(|_| gone("pictures"))?;
+    let worker = app.clone();
+    let work = move || {
+        // One at a time bounds the memory
+        let _turn = worker.judged.blocking_lock();
+        let gallery = worker.gallery().clone();
+        let map = jods_lost(&gallery, &id, &worker.setup.model, worker.setup.viewing)?;
+        Ok::<_, GalleryError>((gallery.pictures.iter().find(|p| p.id == id).map(|p| p.still.size), map))
+    };
+    let (size, map) = blocking(work).await??;
+    let size = size.ok_or_else(|| gone("pictures"))?;
+    png(move || images::lost(size, &map)).await
 }
 
 async fn png(make: impl FnOnce() -> Result<Vec<u8>, image::ImageError> + Send + 'static) -> Answer {

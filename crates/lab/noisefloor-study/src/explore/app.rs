@@ -26,6 +26,8 @@ pub struct ExploreSetup {
     pub database: PathBuf,
     /// Human thresholds for retraining; without them the page cannot retrain.
     pub table: Option<Table>,
+    /// Layer of EXR files that is read; `None` for the one that renderers mean.
+    pub layer: Option<String>,
     /// Pictures to start with.
     pub pictures: Vec<PathBuf>,
 }
@@ -41,6 +43,7 @@ impl ExploreSetup {
             tile: DEFAULT_TILE,
             database: database.as_ref().to_owned(),
             table: None,
+            layer: None,
             pictures: Vec::new(),
         }
     }

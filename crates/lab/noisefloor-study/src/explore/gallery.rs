@@ -8,6 +8,7 @@ use noisefloor::{
     tile::TileError,
 };
 use noisefloor_image::{ReadOptions, read_facts, read_picture_with};
+use noisefloor_vision::VisionError;
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -41,6 +42,8 @@ pub(crate) enum GalleryError {
     Tile(#[from] TileError),
     #[error("{0} tiles are more than {MAX_TILES}; take larger ones")]
     Tiles(usize),
+    #[error(transparent)]
+    Vision(#[from] VisionError),
 }
 
 /// One picture of the gallery.
@@ -67,16 +70,17 @@ pub(crate) struct PictureView {
 }
 
 impl GalleryPicture {
-    /// Reads a PNG, EXR or PFM file. An EXR may state its samples per pixel, as those of `noisefloor render`
+    /// Reads a PNG, EXR or PFM file, of an EXR the named layer if it has it. An EXR may state its samples per pixel, as those of `noisefloor render`
     /// do; otherwise its name may: `00100.png`, `kitchen-64spp.exr`.
     ///
     /// # Errors
     /// [`StudyError::Picture`] if the file is not a picture, broken or too large; [`StudyError::NotFinite`]
     /// if a pixel is not finite.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, StudyError> {
+    pub fn read(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Self, StudyError> {
         let path = path.as_ref();
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let options = ReadOptions { most_pixels: MAX_GALLERY_PIXELS, ..ReadOptions::default() };
+        let layer = layer.map(str::to_owned);
+        let options = ReadOptions { most_pixels: MAX_GALLERY_PIXELS, layer, ..ReadOptions::default() };
         let picture = read_picture_with(path, &options)?;
         let facts = read_facts(path)?;
         // Tiles of different counts have none in common: the page asks

@@ -7,26 +7,35 @@ use noisefloor::Rgb;
 
 /// Range of the noise map, as in `noisefloor judge --noise-map`: logarithmic, 1 is just seen.
 const SCALE: [f32; 2] = [0.25, 4.0];
+/// Range of the map of JODs lost, as in `render --denoise`: from nothing that people see to what three of four do.
+const LOST: [f32; 2] = [0.01, 1.0];
 
 /// The picture as displayed, so many stops brighter.
 pub(crate) fn shown(tiles: &Tiles, stops: f32) -> Result<Vec<u8>, ImageError> {
     let byte = |c: f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
     let shown = |p: &Rgb| tiles.display.encode(p.map(|c| c * stops.exp2())).map(byte);
-    encode(tiles, tiles.still.pixels.iter().flat_map(shown).collect())
+    let size = (tiles.grid.width(), tiles.grid.height());
+    encode(size, tiles.still.pixels.iter().flat_map(shown).collect())
 }
 
 /// The map of visible noise; `None` if the descriptor has none.
 pub(crate) fn noise(tiles: &Tiles) -> Option<Result<Vec<u8>, ImageError>> {
-    let span = (SCALE[1] / SCALE[0]).ln();
-    let colour = |value: &f32| {
-        let place = ((value.max(f32::MIN_POSITIVE) / SCALE[0]).ln() / span).clamp(0.0, 1.0);
-        colorous::INFERNO.eval_continuous(f64::from(place)).as_array()
-    };
-    Some(encode(tiles, tiles.noise.as_ref()?.iter().flat_map(colour).collect()))
+    let size = (tiles.grid.width(), tiles.grid.height());
+    Some(encode(size, tiles.noise.as_ref()?.iter().flat_map(|&value| colour(value, SCALE)).collect()))
 }
 
-fn encode(tiles: &Tiles, rgb: Vec<u8>) -> Result<Vec<u8>, ImageError> {
-    let (width, height) = (tiles.grid.width() as u32, tiles.grid.height() as u32);
+/// The map of JODs lost, of a picture of this size.
+pub(crate) fn lost(size: (usize, usize), map: &[f32]) -> Result<Vec<u8>, ImageError> {
+    encode(size, map.iter().flat_map(|&value| colour(value, LOST)).collect())
+}
+
+fn colour(value: f32, [low, high]: [f32; 2]) -> [u8; 3] {
+    let place = ((value.max(f32::MIN_POSITIVE) / low).ln() / (high / low).ln()).clamp(0.0, 1.0);
+    colorous::INFERNO.eval_continuous(f64::from(place)).as_array()
+}
+
+fn encode((width, height): (usize, usize), rgb: Vec<u8>) -> Result<Vec<u8>, ImageError> {
+    let (width, height) = (width as u32, height as u32);
     let mut png = Vec::new();
     PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub).write_image(
         &rgb,

@@ -2,12 +2,13 @@
 
 use super::gallery::{Gallery, GalleryError, GalleryPicture};
 use noisefloor::{
-    Audience, Model, Oracle, People, TileGrid, ToneMapping, Verdict, Viewing,
+    Audience, Model, Oracle, People, Rgb, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     descriptor::{Described, Descriptor},
     display::Display,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
 };
+use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -55,19 +56,49 @@ impl Judged {
     }
 }
 
-fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Result<Tiles, GalleryError> {
+/// A picture with known samples, beside all others of the gallery.
+fn beside<'a>(
+    gallery: &'a Gallery,
+    id: &str,
+    model: &Model,
+    viewing: Viewing,
+) -> Result<(&'a GalleryPicture, SnapshotPair<'a>), GalleryError> {
     let picture = gallery.pictures.iter().find(|p| p.id == id).ok_or(GalleryError::Gone)?;
-    let spp = picture.spp().ok_or_else(|| GalleryError::NoSamples(picture.name.clone()))?;
+    if picture.spp().is_none() {
+        return Err(GalleryError::NoSamples(picture.name.clone()));
+    }
     let others: Vec<&Still> =
         gallery.pictures.iter().filter(|p| p.id != id && p.counted).map(|p| &*p.still).collect();
-    let held = SnapshotPair::new(
-        model.evidence(),
-        &picture.still,
-        &others,
-        ToneMapping::default(),
-        gallery.samples,
-    )?
-    .seen_on(viewing);
+    let (evidence, tone) = (model.evidence(), ToneMapping::default());
+    let held = SnapshotPair::new(evidence, &picture.still, &others, tone, gallery.samples)?;
+    Ok((picture, held.seen_on(viewing)))
+}
+
+/// JODs that a picture has lost around each pixel, row-major: by what its noise is held against, a picture with as much
+/// noise as it has is compared with the same one without.
+pub(crate) fn jods_lost(
+    gallery: &Gallery,
+    id: &str,
+    model: &Model,
+    viewing: Viewing,
+) -> Result<Vec<f32>, GalleryError> {
+    let (picture, held) = beside(gallery, id, model, viewing)?;
+    let (width, height) = picture.still.size;
+    let planes = held.planes(Tile { index: 0, x: 0, y: 0, width, height })?;
+    // Planes reach over the edges of the picture
+    let inner = planes.inner;
+    let with = |noise: f32| -> Vec<Rgb> {
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (inner.y + y, inner.x + x)));
+        places.map(|at| [planes.image[at] + noise * planes.residual[at]; 3]).collect()
+    };
+    let (test, reference) = (with(1.0), with(0.0));
+    let (eyes, mut room) = (VisionModel::new(&viewing), VisionWorkspace::default());
+    Ok(eyes.compare(&test, &reference, (width, height), &mut room)?.map().to_vec())
+}
+
+fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Result<Tiles, GalleryError> {
+    let (picture, held) = beside(gallery, id, model, viewing)?;
+    let spp = picture.still.spp;
     let (width, height) = picture.still.size;
     let grid = TileGrid::new(width, height, gallery.tile)?;
     // Other people change verdicts only; 1 in the map is where the default share of them sees noise
@@ -169,8 +200,8 @@ impl Judge {
         tiles: &Tiles,
         said: &HashMap<[usize; 4], Answered>,
     ) -> Result<VerdictView, String> {
-        let view = |(tile, verdict): (noisefloor::Tile, Verdict)| {
-            let noisefloor::Tile { index, x, y, width, height } = tile;
+        let view = |(tile, verdict): (Tile, Verdict)| {
+            let Tile { index, x, y, width, height } = tile;
             TileView {
                 tile: index,
                 x,

@@ -9,6 +9,9 @@ use noisefloor_pages::viewing::{Ambient, Conditions};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::f64::consts::PI;
 
+/// Share of the variance between people that is common to all places: 0.36² of 0.5² (docs/accuracy.md).
+const COMMON: f64 = 0.52;
+
 /// The population that simulated observers are drawn from.
 #[derive(Clone, Debug)]
 pub struct Public {
@@ -19,6 +22,9 @@ pub struct Public {
     /// Scale of the spread between observers, in ln(spp), at least 0. All shapes have the standard deviation
     /// of a logistic distribution of this scale.
     pub between: f64,
+    /// Scale of the logistic spread between observers that each tile has of its own, in ln(spp), at least 0; beside
+    /// `between`, which an observer has in all tiles.
+    pub by_place: f64,
     /// Scale of the logistic spread of one observer from showing to showing (the inverse slope of the
     /// psychometric function), in ln(spp), at least 0.
     pub within: f64,
@@ -100,7 +106,21 @@ impl Public {
         };
         let of_stack = |s: &StudyStack| (0..s.grid().len()).map(|tile| threshold(s, tile)).collect();
         let thresholds = study.stacks.iter().map(of_stack).collect();
-        Self { thresholds, shape: SpreadShape::Logistic, between: 0.3, within: 0.1, lapse: 0.01, bias: 0.0 }
+        let shape = SpreadShape::Logistic;
+        Self { thresholds, shape, between: 0.3, by_place: 0.0, within: 0.1, lapse: 0.01, bias: 0.0 }
+    }
+
+    /// The same with a spread of people in one place of this standard deviation of ln(spp). About half of its variance
+    /// is common to all tiles, as it is in what P counts (`noisefloor::oracle::Spread`).
+    pub fn spread_by(self, deviation: f64) -> Self {
+        // A logistic distribution of scale s has the standard deviation s·π/√3
+        let scale = deviation * 3f64.sqrt() / PI;
+        Self { between: scale * COMMON.sqrt(), by_place: scale * (1.0 - COMMON).sqrt(), ..self }
+    }
+
+    /// Standard deviation of ln(threshold) between people in one place.
+    pub fn deviation(&self) -> f64 {
+        self.between.hypot(self.by_place) * PI / 3f64.sqrt()
     }
 
     /// Draws an observer; the same seed gives the same one.
@@ -112,9 +132,11 @@ impl Public {
     pub fn draw_as(&self, seed: u64, behaviour: Behaviour) -> SimulatedObserver {
         let mut random = noisefloor_pages::random::seeded(seed);
         let own = self.between * self.shape.draw(&mut random);
-        let ln = |tiles: &Vec<f64>| tiles.iter().map(|t| t.ln() + own).collect();
+        let (shape, by_place) = (self.shape, self.by_place);
+        let mut here = || if by_place > 0.0 { by_place * shape.draw(&mut random) } else { 0.0 };
+        let mut ln = |tiles: &Vec<f64>| tiles.iter().map(|t| t.ln() + own + here()).collect();
         SimulatedObserver {
-            ln_thresholds: self.thresholds.iter().map(ln).collect(),
+            ln_thresholds: self.thresholds.iter().map(&mut ln).collect(),
             behaviour,
             within: self.within,
             lapse: self.lapse,
@@ -135,14 +157,20 @@ impl Public {
     pub fn levels(&self, stack: usize, tile: usize) -> [f64; 3] {
         let median = self.thresholds[stack][tile];
         let mut random = noisefloor_pages::random::seeded(0);
-        let own = (0..400_001).map(|_| (self.between * self.shape.draw(&mut random)).exp());
+        let own = (0..400_001).map(|_| self.own(&mut random).exp());
         [median, median * own.sum::<f64>() / 400_001.0, self.quantile(stack, tile, 0.95)]
+    }
+
+    /// How far an observer lies from the median in a tile.
+    fn own(&self, random: &mut fastrand::Rng) -> f64 {
+        let here = if self.by_place > 0.0 { self.by_place * self.shape.draw(random) } else { 0.0 };
+        self.between * self.shape.draw(random) + here
     }
 
     /// How far observers and showings lie from the median, in ln(spp), in ascending order.
     fn spread(&self) -> Vec<f64> {
         let mut random = noisefloor_pages::random::seeded(0);
-        let mut draw = |_| self.between * self.shape.draw(&mut random) + logistic(&mut random, self.within);
+        let mut draw = |_| self.own(&mut random) + logistic(&mut random, self.within);
         let mut sums: Vec<f64> = (0..400_001).map(&mut draw).collect();
         sums.sort_by(f64::total_cmp);
         sums
@@ -303,6 +331,7 @@ mod tests {
             thresholds: vec![vec![250.0]],
             shape: SpreadShape::Logistic,
             between: 0.0,
+            by_place: 0.0,
             within: 0.0,
             lapse: 0.0,
             bias: 0.0,
@@ -346,6 +375,7 @@ mod tests {
             thresholds: vec![vec![1000.0]],
             shape: SpreadShape::Logistic,
             between: 0.3,
+            by_place: 0.0,
             within: 0.0,
             lapse: 0.0,
             bias: 0.0,

@@ -118,7 +118,10 @@ pub(crate) fn browser(programs: &[&str]) -> Option<()> {
     let missing: Vec<&str> = [
         (installed("node"), "node"),
         (Path::new("/usr/bin/chromium").exists(), "/usr/bin/chromium (apt-get install chromium)"),
-        (modules.exists(), "playwright-core (npm ci --ignore-scripts in crates/noisefloor-study/browser)"),
+        (
+            modules.exists(),
+            "playwright-core (npm ci --ignore-scripts in crates/lab/noisefloor-study/browser)",
+        ),
     ]
     .into_iter()
     .chain(programs.iter().map(|program| (installed(program), *program)))
@@ -230,7 +233,6 @@ fn loops_of_frames_play_in_a_browser() {
 /// A stack whose last picture's name says nothing, and a picture of another size, on the page of `explore`:
 /// browser/explore.test.mjs.
 #[test]
-#[ignore = "retraining by keyboard and the viewer's own test fail since explore is a viewer: docs/known-issues.md"]
 fn pictures_are_explored_in_a_browser() {
     if browser(&[]).is_none() {
         return;
@@ -335,6 +337,7 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
         thresholds,
         shape: SpreadShape::Logistic,
         between: 0.25,
+        by_place: 0.0,
         within: 0.1,
         lapse: 0.01,
         bias: 0.1,

@@ -394,3 +394,22 @@ fn retraining_moves_p_and_says_what_it_costs() {
     let again = retrain(&table(), answers, &params, (&bundled, People::DEFAULT), &corpus, |_| ()).unwrap();
     assert_eq!(again.0.digest(), model.digest());
 }
+
+/// The map of JODs of a page is the vision model's of the picture with its noise against that without, in colours: where
+/// a picture has more samples, it has lost less.
+#[test]
+fn the_map_of_jods_is_the_vision_models() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Served::explorer(setup(dir.path()));
+    let state = server.get("/api/state");
+    let brightness = |at: usize| {
+        let id = state["pictures"][at]["id"].as_str().unwrap();
+        let (status, _, bytes) = server.raw("GET", &format!("/api/pictures/{id}/lost.png"), "", &[]);
+        assert_eq!(status, 200);
+        let map = image::load_from_memory(&bytes).unwrap().to_rgb8();
+        assert_eq!(map.dimensions(), (128, 64));
+        map.pixels().map(|p| p.0.iter().map(|&c| u64::from(c)).sum::<u64>()).sum::<u64>()
+    };
+    let (first, second) = (brightness(0), brightness(1));
+    assert!(second < first, "{first} {second}");
+}

@@ -157,6 +157,7 @@ pub(crate) fn public(stacks: usize, thresholds: &[f64]) -> Public {
         thresholds: vec![thresholds.to_vec(); stacks],
         shape: SpreadShape::Logistic,
         between: 0.3,
+        by_place: 0.0,
         within: 0.1,
         lapse: 0.01,
         bias: 0.0,

@@ -168,6 +168,7 @@ fn thresholds_of_loops_are_found_and_kept_out_of_the_corpus() {
         thresholds: vec![vec![400.0, 500.0], vec![150.0, 200.0]],
         shape: SpreadShape::Logistic,
         between: 0.25,
+        by_place: 0.0,
         within: 0.1,
         lapse: 0.0,
         bias: 0.0,

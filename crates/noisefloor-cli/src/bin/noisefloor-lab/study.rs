@@ -61,6 +61,8 @@ pub struct SimulateJob {
     /// All its pictures can be shown.
     pub study: Arc<Study>,
     pub observers: u16,
+    /// Standard deviation of ln(threshold) between people in one place.
+    pub spread: f64,
     pub seed: u64,
 }
 
@@ -136,7 +138,7 @@ fn analysis(job: &AnalyseJob) -> anyhow::Result<()> {
 
 fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
     let study = &job.study;
-    let public = Public::made_up(study);
+    let public = Public::made_up(study).spread_by(job.spread);
     let runtime = runtime()?;
     let (stop, stopped) = oneshot::channel::<()>();
     let address = SocketAddr::new(Ipv4Addr::LOCALHOST.into(), 0);
@@ -161,6 +163,7 @@ fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
         }
     }
     say!("{}", report::WHAT_TRAIN_GETS)?;
+    say!("spread of people in one place: {:.2} in ln(samples)", public.deviation())?;
     Ok(())
 }
 

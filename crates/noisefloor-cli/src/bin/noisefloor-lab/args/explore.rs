@@ -3,6 +3,7 @@
 use clap::Args;
 use noisefloor::{Audience, tile::DEFAULT_TILE};
 use noisefloor_cli::options::eyes::EyesArgs;
+use noisefloor_cli::options::layer::LayerArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
@@ -14,7 +15,7 @@ use std::path::PathBuf;
 ///
 /// Drop renderings of one view on the page, or name them here: two with different seeds, snapshots of one
 /// rendering, or a picture and its converged reference (PNG, EXR or PFM). The page shows what `judge` says
-/// of each tile, a map of visible noise, and the predicted samples; the share of people and the audience follow a slider.
+/// of each tile, maps of visible noise and of the JODs lost, and the predicted samples; the share of people and the audience follow a slider.
 /// A click on a tile says that the verdict is wrong. It is stored in the database before it is
 /// acknowledged; `train --disagreements` learns from it, and so does the page itself with --table.
 ///
@@ -30,6 +31,8 @@ pub struct ExploreArgs {
     /// such as 00100.png or hall_64spp.exr; otherwise the page asks.
     #[arg(value_name = "IMAGE")]
     images: Vec<PathBuf>,
+    #[command(flatten)]
+    layer: LayerArgs,
     #[command(flatten)]
     oracle: OracleArgs,
     #[command(flatten)]
@@ -75,6 +78,7 @@ impl ExploreArgs {
             tile: self.tile,
             database: self.database,
             table: self.table.as_deref().map(crate::learning::read_table_file).transpose()?,
+            layer: self.layer.layer,
             pictures: self.images,
         };
         Ok(crate::explore::ExploreJob { setup, listen: self.listen, allow_host: self.allow_host })

@@ -147,8 +147,8 @@ struct BackupArgs {
     to: PathBuf,
 }
 
-/// Analyse the answers: thresholds of tiles, agreement, groups, Table 2 of the paper, plots, and a corpus
-/// for `train`.
+/// Analyse the answers: thresholds of tiles, agreement, the spread of people, groups, Table 2 of the paper, plots, and
+/// a corpus for `train`.
 #[derive(Debug, Args)]
 struct AnalyseArgs {
     /// Study file.
@@ -191,9 +191,17 @@ struct SimulateArgs {
     /// Number of observers.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=1000))]
     observers: u16,
+    /// Standard deviation of ln(threshold) between people in one place; about half of its variance is common to all
+    /// tiles.
+    #[arg(long, value_name = "SD", default_value_t = 0.5, value_parser = deviation)]
+    spread: f64,
     /// Seed: the same seed draws the same observers.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+}
+
+fn deviation(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|sd| (0.0..=3.0).contains(sd)).ok_or("it is a number from 0 to 3".into())
 }
 
 /// One observer.
@@ -236,6 +244,7 @@ impl StudyArgs {
             StudyCommand::Simulate(args) => StudyJob::Simulate(SimulateJob {
                 study: complete(&args.study)?,
                 observers: args.observers,
+                spread: args.spread,
                 seed: args.seed,
             }),
             StudyCommand::Links(args) => StudyJob::Links(LinksJob {

@@ -45,6 +45,7 @@ pub(super) fn say_all(report: &StudyReport) -> Result<(), NotSaid> {
             b.icc_mean
         )?;
     }
+    say_spread(report)?;
     say_groups(report)?;
     for c in &report.classes {
         let [low, high] = c.identical.wilson.map(|v| 100.0 * v);
@@ -75,6 +76,36 @@ fn say_tiles(report: &StudyReport) -> Result<(), NotSaid> {
     }
     if !report.tiles.is_empty() {
         say!("{WHAT_TRAIN_GETS}")?;
+    }
+    Ok(())
+}
+
+fn say_spread(report: &StudyReport) -> Result<(), NotSaid> {
+    for s in &report.spread {
+        let stack =
+            s.stack.as_ref().map_or("spread of people in one place".to_owned(), |name| format!("  {name}"));
+        let interval = match s.interval {
+            Some([low, high]) => format!("95 % interval {low:.2} to {high:.2}"),
+            None => "no interval: they hardly differ".to_owned(),
+        };
+        let left_out = match s.left_out {
+            0 => String::new(),
+            n => format!("; {n} tiles left out, whose median lies within ×4 of an end of the stack"),
+        };
+        say!(
+            "{stack}: {:.2} in ln(samples), {interval}, of {} observers and {} tiles{left_out}",
+            s.people,
+            s.observers,
+            s.tiles
+        )?;
+        if s.stack.is_none() {
+            say!(
+                "  of it {:.2} in all tiles alike and {:.2} by tile; one person, from showing to showing: {:.2}",
+                s.common,
+                s.by_place,
+                s.within
+            )?;
+        }
     }
     Ok(())
 }
