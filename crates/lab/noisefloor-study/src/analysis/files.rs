@@ -146,7 +146,9 @@ impl Page {
              <meta name=\"viewport\" content=\"width=device-width\"><title>noisefloor-lab study analyse</title>\n\
              <style>body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }}\n\
              img {{ max-width: 100%; height: auto }}\n\
-             th, td {{ text-align: left; font-weight: normal; padding: 0 1rem 0 0; vertical-align: top }}</style></head>\n<body>\n<h1>{} {who}</h1>\n\
+             img[src$='.png'] {{ width: min(100%, 45rem); image-rendering: pixelated }}\n\
+             th, td {{ text-align: left; font-weight: normal; padding: 0 1rem 0 0; vertical-align: top }}\n\
+             </style></head>\n<body>\n<h1>{} {who}</h1>\n\
              <p>{left} of them excluded. <a href=\"observers.csv\">observers.csv</a>, \
              <a href=\"report.json\">report.json</a></p>\n{}{}</body></html>\n",
             report.observers.len(),

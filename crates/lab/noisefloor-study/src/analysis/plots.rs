@@ -10,6 +10,8 @@ use plotters::prelude::{
     ChartBuilder, Circle, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor, SVGBackend, WHITE,
 };
 use plotters::style::Color;
+use std::cell::Cell;
+use std::ops::Range;
 
 const SIZE: (u32, u32) = (720, 480);
 const LETTERS: (&str, u32) = ("sans-serif", 15);
@@ -21,6 +23,18 @@ const POINTS: usize = 120;
 
 fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError::Analysis(format!("a plot cannot be drawn: {error}"))
+}
+
+/// Labels of a logarithmic axis, none of which touch: 1, 2, 3 and 5 times a power of ten, each once, since plotters asks
+/// twice for powers of ten; everything where little is covered.
+fn samples(covered: Range<f64>) -> impl Fn(&f64) -> String {
+    let (last, all) = (Cell::new(0.0), covered.end / covered.start < 6.0);
+    move |&spp| {
+        let digit = spp / 10f64.powf((spp * (1.0 + 1e-9)).log10().floor());
+        let is_plain = [1.0, 2.0, 3.0, 5.0].iter().any(|plain| (digit - plain).abs() < 1e-6);
+        let is_new = last.replace(spp) != spp;
+        if is_new && (all || is_plain) { format!("{spp:.0}") } else { String::new() }
+    }
 }
 
 /// Mean and 95 % level of each tile with intervals, in table order.
@@ -51,7 +65,7 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
                 true => format!("{}", x.round() as i64),
                 false => String::new(),
             })
-            .y_label_formatter(&|spp| format!("{spp:.0}"))
+            .y_label_formatter(&samples(low..high))
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
             .light_line_style(WHITE)
@@ -92,7 +106,7 @@ pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, Study
             .configure_mesh()
             .x_desc("samples per pixel; a line a tile, a dot where 95 % see no difference")
             .y_desc("share who see no difference")
-            .x_label_formatter(&|spp| format!("{spp:.0}"))
+            .x_label_formatter(&samples(low..high))
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
             .light_line_style(WHITE)
@@ -178,4 +192,20 @@ pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold
         }
     }
     canvas
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As plotters asks: each value of a decade, and powers of ten at the end of one and the beginning of the next.
+    #[test]
+    fn labels_of_an_axis_do_not_touch() {
+        let label = samples(8.0..2000.0);
+        let asked = [80.0, 90.0, 100.0, 100.0, 200.0, 300.0, 400.0, 500.0, 900.0, 1000.0, 1000.0];
+        let said: Vec<String> = asked.iter().map(&label).filter(|l| !l.is_empty()).collect();
+        assert_eq!(said, ["100", "200", "300", "500", "1000"]);
+        let narrow: Vec<String> = [400.0, 600.0, 700.0].iter().map(samples(350.0..800.0)).collect();
+        assert_eq!(narrow, ["400", "600", "700"]);
+    }
 }
