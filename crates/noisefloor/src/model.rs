@@ -109,10 +109,14 @@ impl Model {
     /// What tells it from other models.
     pub(crate) fn fingerprint(&self) -> String {
         #[cfg(feature = "files")]
-        return self.digest();
+        {
+            self.digest()
+        }
         // Without files, nothing is resumed, and nobody keeps this
         #[cfg(not(feature = "files"))]
-        format!("{:?}", self.0)
+        {
+            format!("{:?}", self.0)
+        }
     }
 
     /// What a tile is compared with.

@@ -23,7 +23,7 @@
 
 mod search;
 
-pub use search::{CROP, Look, Search, Viewer, crops_for, drive};
+pub use search::{CROP, Look, Looked, Search, Viewer, crops_for, drive};
 
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
 use crate::film::{Film, blend_row};

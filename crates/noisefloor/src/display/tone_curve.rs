@@ -19,9 +19,13 @@ type Key = Vec<u8>;
 
 fn key(identity: &[u8]) -> Key {
     #[cfg(feature = "files")]
-    return *blake3::hash(identity).as_bytes();
+    {
+        *blake3::hash(identity).as_bytes()
+    }
     #[cfg(not(feature = "files"))]
-    identity.to_vec()
+    {
+        identity.to_vec()
+    }
 }
 
 /// The functions of all curves that there are, by the digest of their identity: one that is read from a file
@@ -61,6 +65,7 @@ impl ToneCurve {
     /// is clamped to [0, 1]; NaN becomes 0. It must return the same for the same radiance. `identity` is all
     /// that tells it from other curves: a name with a version and parameters, or the contents of a LUT. Of two
     /// functions with one identity the first is used, as long as one of its curves is there.
+    #[cfg_attr(feature = "files", expect(clippy::clone_on_copy, reason = "without files, it is no array"))]
     pub fn new(identity: &[u8], map: impl Fn(Rgb) -> Rgb + Send + Sync + 'static) -> Self {
         let key = key(identity);
         let mut curves = curves();
@@ -92,9 +97,10 @@ impl PartialEq for ToneCurve {
 impl fmt::Debug for ToneCurve {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         #[cfg(feature = "files")]
-        return write!(f, "ToneCurve({})", self.digest());
+        let name = self.digest();
         #[cfg(not(feature = "files"))]
-        write!(f, "ToneCurve({})", String::from_utf8_lossy(&self.key))
+        let name = String::from_utf8_lossy(&self.key);
+        write!(f, "ToneCurve({name})")
     }
 }
 

@@ -8,8 +8,8 @@ use crate::tune::pictures::{Crop, Judged, Judges, Pair, View};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Tuning, Viewer, drive};
-use noisefloor::{Audience, Oracle, Params, Tile, ToneMapping, Viewing};
+use noisefloor::tune::{CROP, Ending, Excess, Look, Looked, Next, Search, Tuning, Viewer, drive};
+use noisefloor::{Audience, Oracle, Params, ToneMapping, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::{note, say, say_json};
@@ -196,7 +196,7 @@ impl<'a> Tune<'a> {
 impl Viewer for Tune<'_> {
     type Error = anyhow::Error;
 
-    fn look(&mut self, look: &Look) -> anyhow::Result<(Excess, Vec<(Tile, f64)>)> {
+    fn look(&mut self, look: &Look) -> anyhow::Result<Looked> {
         let job = self.job;
         let view = &mut self.views[look.view];
         let mut what = format!("{} {}", job.tuning.knob().name(), look.setting);
