@@ -149,7 +149,7 @@ impl Clock {
 ///         SourceInfo::new("wall", 64, 32)
 ///     }
 ///     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
-///         Ok(requests.iter().map(|r| Batch { tile: r.tile, spp: r.spp, mean: vec![[0.2; 3]; r.tile.pixels()] }).collect())
+///         Ok(requests.iter().map(|r| Batch::new(r.tile, r.spp, vec![[0.2; 3]; r.tile.pixels()])).collect())
 ///     }
 /// }
 ///

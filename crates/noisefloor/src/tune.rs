@@ -14,6 +14,7 @@
 //!         // A renderer whose noise is seen as soon as its threshold is above 0.03
 //!         Next::Render { setting, .. } => tuning.tell(Excess::new(setting / 0.03)),
 //!         Next::Done(ending) => break ending,
+//!         next => panic!("{next:?}"),
 //!     }
 //! };
 //! let Ending::Found { setting, .. } = ending else { panic!("{ending:?}") };
