@@ -45,7 +45,7 @@ pub struct TrainingRecord {
     pub leave_one_scene_out: Option<Scores>,
 }
 
-/// Everything a model consists of, unchecked: [`Model::new`] checks that it fits together.
+/// Everything a model consists of, unchecked: [`Model::new`](super::Model::new) checks that it fits together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelParts {
     /// What is computed from a tile.
@@ -88,7 +88,7 @@ pub struct Judgement {
 }
 
 impl ModelParts {
-    /// Judges a tile by its raw descriptor, as [`Model::judge`] does: for scoring what is not a whole model,
+    /// Judges a tile by its raw descriptor, as [`Model::judge`](super::Model::judge) does: for scoring what is not a whole model,
     /// such as one trained on some of a descriptor's numbers.
     ///
     /// # Panics
