@@ -177,9 +177,12 @@ impl Checkpoint<'_> {
         if !criterion.asks_for_more_than(&self.criterion) {
             same("criterion", self.criterion.clone(), criterion.fingerprint())?;
         }
-        // More samples may be allowed than before
-        let more = self.params.max_spp.max(params.max_spp);
-        if let Some((what, kept, now)) = changed_param(&self.params.clone().with_max_spp(more), params) {
+        // More samples may be allowed than before, and so may more than the fewest be, where these were held to the most
+        let Params { min_spp: fewest, max_spp: most, .. } = self.params;
+        let held = fewest == most && params.min_spp > fewest;
+        let grown = self.params.clone().with_max_spp(most.max(params.max_spp));
+        let grown = grown.with_min_spp(if held { params.min_spp } else { fewest });
+        if let Some((what, kept, now)) = changed_param(&grown, params) {
             let kept = if what == MOST_SPP { self.params.max_spp.to_string() } else { kept };
             return Err(CheckpointError::Other { what, kept, now });
         }

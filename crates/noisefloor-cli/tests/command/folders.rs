@@ -1,4 +1,4 @@
-use crate::kit::{command, fail, run, stderr, succeed, text, tiny};
+use crate::kit::{command, fail, json, run, stderr, succeed, text, tiny};
 use noisefloor_testkit::HANG;
 use std::path::Path;
 use std::process::Stdio;
@@ -54,6 +54,37 @@ fn other_results_are_overwritten_only_on_request() {
         succeed(&args);
         refuse(&args, &["holds a stack", "--out"]);
     }
+}
+
+/// Whoever asks for more of a finished render goes on with its samples.
+#[test]
+fn a_finished_render_goes_on_if_more_is_asked_for() {
+    let folder = tempdir().unwrap();
+    let out = text(folder.path());
+    let samples = || json(&folder.path().join("report.json"))["samples"].as_u64().unwrap();
+    let complete = || json(&folder.path().join("report.json"))["complete"] == true;
+    let render = |most: &'static str, more: &[&'static str]| {
+        let job = ["render", "plates", "--size", "64x64", "--tile", "64", "--quiet", "--max-spp", most];
+        [&job[..], &["--out", out], more].concat()
+    };
+    succeed(&render("24", &[]));
+    assert!(complete() && samples() == 24 * 64 * 64);
+    refuse(&render("24", &["--resume"]), &["finished", "--max-spp", "--force"]);
+    assert!(complete() && samples() == 24 * 64 * 64);
+    // Of a part that was cut short, too
+    run(&render("64", &["--resume", "--time", "0.000001"]));
+    succeed(&render("64", &["--resume"]));
+    assert!(complete() && samples() == 64 * 64 * 64, "{}", samples());
+    assert!(!folder.path().join("checkpoint.nfc").exists());
+    succeed(&render("16", &["--force"]));
+    assert_eq!(samples(), 16 * 64 * 64);
+    succeed(&render("32", &["--resume"]));
+    assert_eq!(samples(), 32 * 64 * 64);
+
+    let count = ["render", "bulb", "--size", "16x16", "--quiet", "--out", out];
+    succeed(&[&count[..], &["--force", "--criterion", "spp:8"]].concat());
+    succeed(&[&count[..], &["--resume", "--criterion", "spp:20"]].concat());
+    assert!(complete() && samples() == 20 * 16 * 16, "{}", samples());
 }
 
 /// Two renders in one folder at once: the second does not begin, and the first is not disturbed. A lock ends

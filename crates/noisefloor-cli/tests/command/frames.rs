@@ -46,6 +46,8 @@ fn a_sequence_is_rendered_and_resumed_frame_by_frame() {
     fs::write(&second, kept).unwrap();
     let said = succeed(&[&render[..], &["--resume"]].concat());
     assert!(said.contains("3 frames, 8 to 8 samples per pixel"), "{said}");
+    // Samples that nobody is going to ask for again would fill the disk
+    assert!(!out.join("0001/finished.nfc").exists());
     assert_eq!(table(&out), [(1, true, 8.0), (2, true, 8.0), (3, true, 8.0)]);
     assert_eq!(fs::metadata(out.join("0001/image.exr")).unwrap().modified().unwrap(), first);
     // The frames are of one still scene: they differ by their noise, and not by their exposure

@@ -289,7 +289,8 @@ impl Studio for Here {
     ) -> Result<Box<dyn RenderFiles>, StudioError> {
         let FrameJob { scene, source, .. } = frame;
         let (folder, earlier) = (Folder::claim(folder.to_owned())?, Earlier::of(force, false));
-        let mut output = Output::create(folder, earlier, scene.clone(), source.clone(), render.job.clone())?;
+        let mut output =
+            Output::create(folder, earlier, scene.clone(), source.clone(), render.job.clone(), false)?;
         // Only sources that repeat their samples are on a farm
         output.origin = render.job.source.origin(scene, source, true)?;
         output.model = render.job.read()?.oracle.map(|oracle| oracle.model().digest());

@@ -61,6 +61,8 @@ pub struct Output {
     pub seconds_setup: Option<f64>,
     /// Whether there is an earlier render in the folder, and it is not resumed.
     overwrites: bool,
+    /// Whether the checkpoint of a finished render is kept: frames of a sequence would fill the disk with them.
+    keeps_finished: bool,
 }
 
 /// A run that is over: the time it took, and what counts samples, where that is here.
@@ -68,6 +70,8 @@ pub type Over<'a> = (Clock, Option<&'a dyn Source>);
 
 /// Where an interrupted render continues, in its output folder.
 const CHECKPOINT: &str = "checkpoint.nfc";
+/// That of a finished render, for whoever asks for more of it.
+const FINISHED: &str = "finished.nfc";
 const REPORT: &str = "report.json";
 const PICTURE: &str = "image.exr";
 const SHOWN: &str = "image.png";
@@ -80,8 +84,9 @@ impl Output {
         scene: String,
         source: String,
         job: RenderJob,
+        keeps_finished: bool,
     ) -> anyhow::Result<Self> {
-        if let Some(occupied) = occupied(&folder, earlier) {
+        if let Some(occupied) = occupied(&folder, earlier, keeps_finished) {
             return Err(occupied.into());
         }
         check_writable(folder.path().join("image.exr"))?;
@@ -101,6 +106,7 @@ impl Output {
             seconds_before,
             seconds_setup: None,
             overwrites,
+            keeps_finished,
         })
     }
 
@@ -116,19 +122,28 @@ impl Output {
 
     /// The file of the checkpoint, for people.
     pub fn checkpoint_file(&self) -> String {
-        self.path(CHECKPOINT).display().to_string()
+        self.resumed_from().display().to_string()
     }
 
-    /// The checkpoint in the folder, if there is one.
+    fn resumed_from(&self) -> PathBuf {
+        self.path(if self.is_finished() { FINISHED } else { CHECKPOINT })
+    }
+
+    /// Whether the checkpoint in the folder is of a finished render.
+    pub fn is_finished(&self) -> bool {
+        self.keeps_finished && self.folder.first_of(&[CHECKPOINT, FINISHED]) == Some(FINISHED)
+    }
+
+    /// The checkpoint in the folder, if there is one: of a render under way, or of a finished one.
     pub fn checkpoint(&self) -> anyhow::Result<Option<Checkpoint<'static>>> {
         // Opening a pipe might never end
-        match std::fs::metadata(self.path(CHECKPOINT)) {
+        match std::fs::metadata(self.resumed_from()) {
             Ok(about) if about.is_file() => {}
             Ok(_) => bail!("{}: is no regular file; remove it to begin anew", self.checkpoint_file()),
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(error).with_context(|| self.checkpoint_file()),
         }
-        let file = File::open(self.path(CHECKPOINT)).with_context(|| self.checkpoint_file())?;
+        let file = File::open(self.resumed_from()).with_context(|| self.checkpoint_file())?;
         let checkpoint = Checkpoint::read(BufReader::new(file))
             .with_context(|| format!("{}: remove it to begin anew", self.checkpoint_file()))?;
         Ok(Some(checkpoint))
@@ -202,17 +217,21 @@ impl Output {
         // how far the render is. While a picture is missing, the render is not done, even if all tiles are
         let done = over.is_some() && session.is_done() && tiles.iter().all(TileState::is_final);
         let job = checkpoint.as_ref().map(Checkpoint::job_digest);
-        let kept = checkpoint.filter(|_| !done);
-        if let Some(checkpoint) = &kept {
-            write_atomic(self.path(CHECKPOINT), |to| checkpoint.write(to))?;
+        let under_way = checkpoint.is_some() && !done;
+        if let Some(checkpoint) = checkpoint.filter(|_| under_way || self.keeps_finished) {
+            write_atomic(self.path(if done { FINISHED } else { CHECKPOINT }), |to| checkpoint.write(to))?;
         }
         write_json(&self.path(REPORT), &Report::new(self, session, &tiles, (job.as_deref(), over)))?;
-        if kept.is_none() { remove(&self.path(CHECKPOINT)) } else { Ok(()) }
+        if under_way { Ok(()) } else { remove(&self.path(CHECKPOINT)) }
     }
 
     /// A report is of the pictures beside it: one of an earlier render is none any more.
     fn forget_earlier(&mut self) -> anyhow::Result<()> {
-        if std::mem::take(&mut self.overwrites) { remove(&self.path(REPORT)) } else { Ok(()) }
+        if std::mem::take(&mut self.overwrites) {
+            remove(&self.path(REPORT))?;
+            remove(&self.path(FINISHED))?;
+        }
+        Ok(())
     }
 }
 
@@ -271,12 +290,13 @@ pub fn render_in(folder: &Path) -> Option<&'static str> {
 }
 
 /// The render that must not be overwritten, if there is one.
-fn occupied(folder: &Folder, earlier: Earlier) -> Option<Usage> {
+fn occupied(folder: &Folder, earlier: Earlier, keeps_finished: bool) -> Option<Usage> {
     let (found, path) = (folder.first_of(&[CHECKPOINT, REPORT, PICTURE])?, folder.path().display());
     let resumable = found == CHECKPOINT;
     let what = match earlier {
         Earlier::Overwrite => return None,
         Earlier::Resume if found != REPORT => return None,
+        Earlier::Resume if keeps_finished && folder.first_of(&[FINISHED]).is_some() => return None,
         Earlier::Resume => {
             "holds a render that is finished, or that cannot be resumed; --force overwrites it"
         }

@@ -19,6 +19,7 @@ use noisefloor::{
     StopReason, driver::Progress, watch::Fault,
 };
 use noisefloor_cli::bars::Log;
+use noisefloor_cli::end::Usage;
 use noisefloor_cli::files::read_reference;
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::note;
@@ -116,7 +117,7 @@ impl Prepared {
         }
         let origin = job.source.origin(&scene, name, info.repeats == Repeats::Samples)?;
         let folder = Folder::claim(folder)?;
-        let mut output = Output::create(folder, earlier, scene, name.clone(), job.clone())?;
+        let mut output = Output::create(folder, earlier, scene, name.clone(), job.clone(), !is_frame)?;
         output.model = oracle.map(|oracle| oracle.model().digest());
         (output.reference, output.origin, output.denoised) = (reference, origin, denoised);
         if resume {
@@ -206,6 +207,14 @@ fn take_up(driver: Rendering, output: &mut Output, quiet: bool) -> anyhow::Resul
     };
     let resumed = driver.resume(JOB, checkpoint);
     let driver = resumed.with_context(|| format!("{} (--force renders anew)", output.checkpoint_file()))?;
+    if driver.session().is_done() && output.is_finished() {
+        let folder = output.folder();
+        return Err(Usage(format!(
+            "{folder}: holds a render that is finished; ask for more --max-spp or --people, or for less --lost; \
+             --force overwrites it, and --out names another folder"
+        ))
+        .into());
+    }
     output.take_up(driver.session().film().total_samples());
     Ok(driver)
 }
