@@ -16,7 +16,8 @@ fn writes_all_it_promises() {
     // The lock is hidden
     written.retain(|name| name != ".noisefloor.lock");
     written.sort();
-    let mut promised: Vec<_> = FILES.iter().chain(&["noise.png"]).map(|&name| name.to_owned()).collect();
+    let mut promised: Vec<_> =
+        FILES.iter().chain(&["finished.nfc", "noise.png"]).map(|&name| name.to_owned()).collect();
     promised.sort();
     assert_eq!(written, promised);
 
