@@ -729,8 +729,10 @@ class Denoised(unittest.TestCase):
             session.save(pathlib.Path(folder) / "checkpoint", "a wall")
             resumed = self.session(smooth)
             resumed.resume(pathlib.Path(folder) / "checkpoint", "a wall")
+            # More may be asked for, and not less
+            self.session(smooth, lost=0.2).resume(pathlib.Path(folder) / "checkpoint", "a wall")
             with self.assertRaises(nf.CheckpointError):
-                self.session(smooth, lost=0.2).resume(pathlib.Path(folder) / "checkpoint", "a wall")
+                self.session(smooth, lost=0.4).resume(pathlib.Path(folder) / "checkpoint", "a wall")
         np.testing.assert_array_equal(resumed.jods_lost(), session.jods_lost())
         self.assertEqual(finish(resumed, random), whole)
         session, random = half_way()
