@@ -38,8 +38,8 @@ const NOTHING: f32 = 0.5 / 255.0;
 /// Exposed radiance of an average grey.
 const GREY: f32 = 0.18;
 
-/// A sample of more times an average grey is an accident of arithmetic, and tells of no light. If it did, 10⁹ samples, a
-/// thousand of each pixel of 1280×800, would have to be taken before a second such find could go unseen.
+/// A sample of more times an average grey is an accident of arithmetic, and tells of no light. If it did, billions of
+/// samples, thousands of each pixel of 1280×800, would have to be taken before a second such find could go unseen.
 const ACCIDENT: f32 = 1e7;
 
 /// What only one half has met, in a part of the picture.
