@@ -102,7 +102,8 @@ fn a_program_s_own_threshold_is_found() {
         let output = command(&args).output().unwrap();
         (output.status.code(), stderr(&output), serde_json::from_slice::<Value>(&output.stdout).ok())
     };
-    let (code, said, report) = tune("well", &["--from", "0.03"]);
+    // Two and a half times too coarse; from farther off, strong noise hides a part of itself, and a third step is due
+    let (code, said, report) = tune("well", &["--from", "0.025"]);
     assert_eq!(code, Some(0), "{said}");
     let report = report.unwrap();
     let steps = report["steps"].as_array().unwrap();
@@ -111,7 +112,7 @@ fn a_program_s_own_threshold_is_found() {
     assert_eq!((steps.len(), report["ending"].as_str()), (2, Some("found")), "{report}");
     assert!((ratio(&steps[0]) / ratio(&steps[1])).ln().abs() < 0.35, "{report}");
     let each = steps[0]["each"].as_f64().unwrap();
-    assert!((each / 0.03 - std::f64::consts::SQRT_2).abs() < 1e-6);
+    assert!((each / 0.025 - std::f64::consts::SQRT_2).abs() < 1e-6);
 
     // From far away, leaps are made in several steps to the same threshold
     let far = tune("well", &[]).2.unwrap();
