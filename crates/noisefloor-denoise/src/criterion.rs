@@ -5,12 +5,13 @@ use crate::estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY, PartError
 use crate::guides::Guides;
 use crate::mirrored::DenoisePasses;
 use crate::parts::{holds, parts_around, whole, within};
-use crate::record::DenoisedRecord;
+use crate::record::{DenoisedRecord, Done};
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
     criterion::{CriterionError, Needs, View},
     display::Display,
     evidence::TilePlanes,
+    unmet::Unmet,
 };
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use rayon::prelude::*;
@@ -27,6 +28,8 @@ const NO_EVIDENCE: usize = 16;
 /// (`docs/denoising.md`).
 const DECAY: f64 = 0.5;
 const DENOISED_DECAY: f64 = 0.38;
+/// Light that few samples have met is spread over ever more finds.
+const UNMET_DECAY: f64 = 1.0;
 /// JODs that a tile may lose, unless one says otherwise. Where people stopped seeing *noise*, zones had lost as much,
 /// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/criteria.md`).
 pub const DEFAULT_JODS_LOST: f64 = 0.3;
@@ -47,6 +50,10 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 /// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
 /// they are given. [`Verdict::undenoised`] says so, and [`compose`](crate::compose) shows such tiles as they were rendered.
 ///
+/// A tile stays open as long as it is likely to lack light that few samples have met ([`Verdict::unmet`]), and that would by itself
+/// lose more than the limit where it fell on a plain field as bright as the tile: a denoiser takes lone finds for noise, and removes
+/// them. What is found later opens tiles again that had stopped.
+///
 /// A verdict takes two denoisings, of the whole picture or, where the denoiser can do that, of what lies around open tiles: use a
 /// schedule with growing intervals, such as
 /// [`Schedule::Growing`](noisefloor::Schedule::Growing).
@@ -60,13 +67,18 @@ pub struct DenoisedQuality<D> {
     guides: Option<Arc<Guides>>,
     passes: DenoisePasses,
     record: Arc<Mutex<DenoisedRecord>>,
+    /// Tiles that satisfied the last verdict on them, by index.
+    done: Vec<Option<Done>>,
+    /// Verdicts that were not asked for, until they are fetched.
+    revised: Vec<(Tile, Verdict)>,
 }
 
 impl<D: Denoiser> DenoisedQuality<D> {
     /// Tiles may lose at most so many JODs, a positive number: 19 of 20 that stop have lost no more, as their estimates
     /// are held to it with a margin, [`ESTIMATE_ERRS_BY`].
     pub fn new(denoiser: D, lost: f64) -> Self {
-        Self { denoiser, lost, guides: None, passes: DenoisePasses::One, record: Arc::default() }
+        let (guides, passes) = (None, DenoisePasses::One);
+        Self { denoiser, lost, guides, passes, record: Arc::default(), done: Vec::new(), revised: Vec::new() }
     }
 
     /// Helps the denoiser with albedo and normals.
@@ -169,6 +181,11 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         kept.zip(now).is_some_and(|((kept, how), (now, how_now))| now < kept && how == how_now)
     }
 
+    fn begin(&mut self, grid: TileGrid) {
+        self.done = vec![None; grid.len()];
+        self.revised.clear();
+    }
+
     fn needs(&self) -> Needs {
         Needs::HALVES
     }
@@ -179,6 +196,10 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             return Err(CriterionError::Failed { name: self.name(), why });
         }
         let began = Instant::now();
+        let grid = view.film.grid();
+        if self.done.len() != grid.len() {
+            self.begin(grid);
+        }
         let all = whole(view.film.grid().size());
         let parts = parts_around(tiles, view.film.grid().size());
         let errors = self.estimate(view, &parts)?;
@@ -187,15 +208,38 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         let all_errors = if unknown && parts != [all] { self.estimate(view, &[all])? } else { Vec::new() };
         let eyes = VisionModel::new(&view.viewing);
         let limit = self.lost / ESTIMATE_ERRS_BY;
+        let unmet = Unmet::of(view.film, view.display, view.viewing);
         let verdicts: Vec<Verdict> = tiles
             .par_iter()
             .map_init(VisionWorkspace::default, |room, &tile| {
                 let eyes = &mut Eyes { model: &eyes, room };
                 let here = errors.iter().find(|(part, _)| holds(*part, tile));
-                here.map(|here| judge_tile(view, here, tile, limit, eyes))
+                let verdict = here.map(|here| judge_tile(view, here, tile, limit, eyes))?;
+                let dark =
+                    if verdict.converged { darkness(view, &unmet, tile, self.lost, eyes) } else { None };
+                Some(dark.map_or(verdict, |expected| verdict.lacking_light().expecting(expected)))
             })
             .collect::<Option<_>>()
             .expect("each tile is in a part");
+
+        // Of tiles that were done, what has been found elsewhere since can say that they lack it
+        tiles.iter().for_each(|tile| self.done[tile.index] = None);
+        let earlier: Vec<(Tile, Done)> =
+            grid.tiles().filter_map(|tile| Some((tile, self.done[tile.index]?))).collect();
+        self.revised = earlier
+            .par_iter()
+            .map_init(VisionWorkspace::default, |room, &(tile, done)| {
+                let expected = darkness(view, &unmet, tile, self.lost, &mut Eyes { model: &eyes, room })?;
+                let verdict = Verdict::new(false).with_loss(done.lost, done.undenoised);
+                Some((tile, verdict.lacking_light().expecting(expected)))
+            })
+            .flatten()
+            .collect();
+        self.revised.iter().for_each(|(tile, _)| self.done[tile.index] = None);
+        for (tile, verdict) in tiles.iter().zip(&verdicts).filter(|(_, verdict)| verdict.converged) {
+            let (lost, undenoised) = (verdict.lost.unwrap_or_default(), verdict.undenoised);
+            self.done[tile.index] = Some(Done { lost, undenoised });
+        }
 
         let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
         all_errors.into_iter().chain(errors).for_each(|error| record.renew(error, tiles));
@@ -204,14 +248,25 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         Ok(verdicts)
     }
 
-    /// Verdicts follow from film and display alone; what is kept is what reports say.
-    fn state(&self) -> Option<Vec<u8>> {
-        Some(self.record.lock().unwrap_or_else(PoisonError::into_inner).to_bytes())
+    fn revised(&mut self) -> Vec<(Tile, Verdict)> {
+        std::mem::take(&mut self.revised)
     }
 
-    fn restore(&mut self, _grid: TileGrid, state: &[u8]) -> bool {
-        let Some(record) = DenoisedRecord::from_bytes(state) else { return false };
+    /// Verdicts follow from film and display alone; what is kept is which tiles are done, and what reports say.
+    fn state(&self) -> Option<Vec<u8>> {
+        let mut bytes = self.record.lock().unwrap_or_else(PoisonError::into_inner).to_bytes();
+        self.done.iter().for_each(|&done| bytes.extend(Done::to_bytes(done)));
+        Some(bytes)
+    }
+
+    fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
+        let Some((record, tiles)) = DenoisedRecord::from_bytes(state) else { return false };
+        let Some(done) = Done::all_from_bytes(tiles) else { return false };
+        if ![0, grid.len()].contains(&done.len()) {
+            return false;
+        }
         *self.record.lock().unwrap_or_else(PoisonError::into_inner) = record;
+        self.done = done;
         true
     }
 }
@@ -283,6 +338,27 @@ fn judge_tile(
     }
     let verdict = Verdict::new(false).expecting(eyes.needed_by_either([&here, &noise], limit, spp));
     verdict.with_brightness(brightness_differs).with_loss(lost, false)
+}
+
+/// Whether a tile is likely to lack light, on a plain field as bright as it is, that would lose more than `limit`; then the
+/// samples per pixel at which it does not, if these can be told.
+///
+/// Nothing but the film counts: what the denoiser makes of tiles that have stopped is not known after a resume.
+fn darkness(
+    view: &View<'_>,
+    unmet: &Unmet,
+    tile: Tile,
+    limit: f64,
+    eyes: &mut Eyes<'_>,
+) -> Option<Option<u64>> {
+    let (film, display) = (view.film, view.display);
+    let light = unmet.shown(film, display, tile)?;
+    let pixels = tile.rows(film.grid().width()).flatten().map(|pixel| film.pixel(tile.index, pixel));
+    let sum = pixels.fold([0.0; 3], |sum, pixel| std::array::from_fn(|c| sum[c] + f64::from(pixel[c])));
+    let field = display.luma(sum.map(|c| (c / tile.pixels() as f64) as f32));
+    let light = light.residual.inside(light.inner).collect();
+    let light = DenoisedError::of((tile.width, tile.height), vec![field; tile.pixels()], light, display);
+    (eyes.lost(&light, 1.0) > limit).then(|| eyes.needed(&light, limit, (film.spp(tile.index), UNMET_DECAY)))
 }
 
 /// The part of the error that a tile is judged by, its own or the square around it, and what that has lost.

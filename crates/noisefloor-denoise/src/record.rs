@@ -15,6 +15,40 @@ pub struct DenoisedRecord {
     pub verdicts: usize,
 }
 
+/// A tile that satisfied its last verdict.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Done {
+    /// Just-objectionable differences (JOD) that it had lost.
+    pub lost: f64,
+    /// Whether it is shown as rendered.
+    pub undenoised: bool,
+}
+
+impl Done {
+    /// A byte, 0 for an open tile, 1 for one that is done, 2 for one that is done as rendered; and eight for what it has lost,
+    /// little-endian.
+    pub(crate) fn to_bytes(done: Option<Self>) -> [u8; 9] {
+        let lost = done.map_or(0.0, |done| done.lost).to_le_bytes();
+        let kind = done.map_or(0, |done| 1 + u8::from(done.undenoised));
+        std::array::from_fn(|at| if at == 0 { kind } else { lost[at - 1] })
+    }
+
+    /// What [`Done::to_bytes`] returned, for each tile; `None` if it did not.
+    pub(crate) fn all_from_bytes(bytes: &[u8]) -> Option<Vec<Option<Self>>> {
+        let (tiles, rest) = bytes.as_chunks::<9>();
+        let tile = |&[kind, ref lost @ ..]: &[u8; 9]| {
+            let lost = f64::from_le_bytes(*lost);
+            let done = Self { lost, undenoised: kind == 2 };
+            match kind {
+                0 if lost == 0.0 => Some(None),
+                1 | 2 if lost.is_finite() => Some(Some(done)),
+                _ => None,
+            }
+        };
+        if rest.is_empty() { tiles.iter().map(tile).collect() } else { None }
+    }
+}
+
 /// Makes of the denoised picture of a session the one to be shown, row-major: tiles that are
 /// [`undenoised`](noisefloor::Verdict::undenoised) become as they were rendered.
 pub fn compose<C: StoppingCriterion>(session: &Session<C>, rendered: &[Rgb], denoised: &mut [Rgb]) {
@@ -44,13 +78,14 @@ impl DenoisedRecord {
         [(self.verdicts as u64).to_le_bytes(), self.seconds.to_le_bytes()].concat()
     }
 
-    /// What [`DenoisedRecord::to_bytes`] returned; `None` if it did not.
-    pub(crate) fn from_bytes(bytes: &[u8]) -> Option<Self> {
+    /// What [`DenoisedRecord::to_bytes`] returned, and the bytes after it; `None` if it did not.
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let (&verdicts, rest) = bytes.split_first_chunk::<8>()?;
-        let seconds = f64::from_le_bytes(rest.try_into().ok()?);
+        let (&seconds, rest) = rest.split_first_chunk::<8>()?;
+        let seconds = f64::from_le_bytes(seconds);
         let verdicts = usize::try_from(u64::from_le_bytes(verdicts)).ok()?;
         let sound = seconds >= 0.0 && seconds.is_finite();
-        sound.then_some(Self { error: None, seconds, verdicts })
+        sound.then_some((Self { error: None, seconds, verdicts }, rest))
     }
 }
 
@@ -61,14 +96,32 @@ mod tests {
     #[test]
     fn what_is_kept_is_restored_and_nothing_else_is() {
         let bytes = DenoisedRecord { seconds: 1.5, verdicts: 3, error: None }.to_bytes();
-        let again = DenoisedRecord::from_bytes(&bytes).unwrap();
-        assert_eq!((again.seconds, again.verdicts), (1.5, 3));
+        let (again, rest) = DenoisedRecord::from_bytes(&bytes).unwrap();
+        assert_eq!((again.seconds, again.verdicts, rest.len()), (1.5, 3, 0));
         for length in 0..bytes.len() {
             assert!(DenoisedRecord::from_bytes(&bytes[..length]).is_none(), "{length}");
         }
-        assert!(DenoisedRecord::from_bytes(&[&bytes[..], &[0]].concat()).is_none());
         let mut odd = bytes;
         odd[8..16].copy_from_slice(&f64::NAN.to_le_bytes());
         assert!(DenoisedRecord::from_bytes(&odd).is_none());
+    }
+
+    #[test]
+    fn so_are_tiles_that_are_done() {
+        let done = |lost, undenoised| Some(Done { lost, undenoised });
+        let tiles = [None, done(0.1, false), done(0.0, true), None];
+        let bytes: Vec<u8> = tiles.into_iter().flat_map(Done::to_bytes).collect();
+        assert_eq!(Done::all_from_bytes(&bytes).unwrap(), tiles);
+        assert_eq!(Done::all_from_bytes(&[]).unwrap(), []);
+        let spoiled = [
+            &bytes[1..],
+            &[&bytes[..], &[0]].concat(),
+            &[3; 9],
+            &[1, 0, 0, 0, 0, 0, 0, 0xf0, 0x7f],
+            &[0, 1, 0, 0, 0, 0, 0, 0, 0],
+        ];
+        for odd in spoiled {
+            assert!(Done::all_from_bytes(odd).is_none(), "{odd:?}");
+        }
     }
 }

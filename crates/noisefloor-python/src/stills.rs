@@ -1,7 +1,7 @@
 //! Finished pictures.
 
 use crate::arrays::{Picture, plane};
-use crate::errors::{CriterionError, ParameterError, PictureError, Raise};
+use crate::errors::{ParameterError, PictureError, Raise};
 use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pickle::reduced;
@@ -141,24 +141,19 @@ fn judge_still(
     let pair = pair.map_err(Raise::raise)?.seen_on(params.viewing);
     let grid = TileGrid::new(image.size.0, image.size.1, params.tile).map_err(Raise::raise)?;
     let noticed = pair.notice(grid).map_err(Raise::raise)?;
-    let described = pair.describe(oracle, grid).map_err(Raise::raise)?;
-    let verdicts = oracle.judge_described_for(&described, params.audience).ok_or_else(|| {
-        CriterionError::new_err(
-            "the model does not tell noise from picture, and serves only the trained audience",
-        )
-    })?;
+    let judged = pair.judge(oracle, grid, params.audience).map_err(Raise::raise)?;
     let visible_noise = match evidence {
-        Evidence::Halves => oracle.map_visible_noise(grid, &described, params.audience),
+        Evidence::Halves => judged.visible_noise(oracle),
         _ => None,
     };
     Ok(PyJudged {
         size: image.size,
         verdicts: grid
             .tiles()
-            .zip(verdicts)
+            .zip(judged.verdicts())
             .zip(noticed.unlike)
             .map(|((tile, verdict), unlike)| {
-                PyVerdict::of(tile, if unlike { noisefloor::Verdict::default() } else { verdict })
+                PyVerdict::of(tile, if unlike { noisefloor::Verdict::default() } else { *verdict })
             })
             .collect(),
         samples: pair.samples(),

@@ -153,6 +153,11 @@ impl Verdict {
         Self { brightness_differs, ..self }
     }
 
+    /// The same, but open for light that the tile may not have met: [`Verdict::unmet`].
+    pub fn lacking_light(self) -> Self {
+        Self { converged: false, unmet: true, ..self }
+    }
+
     /// The same with [`Verdict::lost`] and [`Verdict::undenoised`].
     pub fn with_loss(self, lost: f64, undenoised: bool) -> Self {
         Self { lost: Some(lost), undenoised, ..self }

@@ -82,7 +82,10 @@ pub mod svm;
 mod text;
 pub mod tile;
 pub mod tune;
+#[cfg(not(feature = "internals"))]
 mod unmet;
+#[cfg(feature = "internals")]
+pub mod unmet;
 pub mod watch;
 
 /// Displays, and how far people sit from them.

@@ -77,11 +77,11 @@ struct LastDescribed {
 }
 
 /// What is found of tiles.
-struct Judged {
+pub(crate) struct Judged {
     /// One for each tile asked about, with whether it is all that the audience asks for.
-    verdicts: Vec<(Verdict, bool)>,
+    pub verdicts: Vec<(Verdict, bool)>,
     /// What each tile of the picture is judged by.
-    described: Vec<Option<Described>>,
+    pub described: Vec<Option<Described>>,
 }
 
 impl Oracle {
@@ -119,11 +119,6 @@ impl Oracle {
             return Err(CriterionError::Viewing { name: self.name(), trained, asked });
         }
         self.model.parts().descriptor.describe_tile(planes, spp).map_err(|e| self.misfit(e))
-    }
-
-    pub(crate) fn judge_all(&self, tiles: &[Described]) -> Vec<Verdict> {
-        let numbers = self.model.parts().descriptor.in_picture(tiles);
-        tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict(&raw, tile.spp.round() as u64)).collect()
     }
 
     fn verdict_for(&self, mut raw: Vec<f32>, spp: f64, audience: Audience) -> Option<Verdict> {
@@ -266,27 +261,14 @@ impl Oracle {
                 |(tile, v): (&Tile, Verdict)| (v, self.is_enough(view, &v, view.film.spp(tile.index)));
             tiles.iter().zip(verdicts).map(enough).collect::<Vec<_>>()
         };
-        let by_noise = judge(&described);
-        let met = met_once(seen);
-        let unmet = Unmet::new(view.film.grid(), &met, view.viewing);
-        let lit: Vec<Option<Described>> = (tiles, &by_noise)
-            .into_par_iter()
-            .map(|(&tile, (_, enough))| if *enough { self.with_light(view, &unmet, tile) } else { Ok(None) })
-            .collect::<Result<_, _>>()?;
-        if lit.iter().all(Option::is_none) {
-            return Ok(Judged { verdicts: by_noise, described });
-        }
-        tiles
-            .iter()
-            .zip(lit)
-            .filter(|(_, lit)| lit.is_some())
-            .for_each(|(tile, lit)| described[tile.index] = lit);
-        let with_light = judge(&described);
-        let worse = |(noise, light): ((Verdict, bool), (Verdict, bool))| match (noise.1, light.1) {
-            (true, enough) => (Verdict { unmet: !enough, ..light.0 }, enough),
-            (false, _) => noise,
+        let unmet = Unmet::new(view.film.grid(), met_once(seen), view.viewing);
+        let lit = |tile: Tile| {
+            let Some(shown) = unmet.shown(view.film, view.display, tile) else { return Ok(None) };
+            let Some(planes) = self.planes(view, tile)? else { return Ok(None) };
+            self.with_light(planes, shown, view.film.spp(tile.index) as f64).map(Some)
         };
-        let verdicts = by_noise.into_iter().zip(with_light).map(worse).collect();
+        let by_noise = judge(&described);
+        let verdicts = judge_with_light(by_noise, &mut described, tiles, judge, lit)?;
         Ok(Judged { verdicts, described })
     }
 
@@ -335,15 +317,13 @@ impl Oracle {
             || (sooner && verdict.expected_spp.is_some_and(|need| audience.samples(need) <= spp))
     }
 
-    /// A tile as it would be with the light that it is likely to lack; `None` if nobody could tell.
+    /// A tile as it would be with the light that it is likely to lack.
     fn with_light(
         &self,
-        view: &View<'_>,
-        unmet: &Unmet<'_>,
-        tile: Tile,
-    ) -> Result<Option<Described>, CriterionError> {
-        let Some(shown) = unmet.shown(view.film, view.display, tile) else { return Ok(None) };
-        let Some(mut planes) = self.planes(view, tile)? else { return Ok(None) };
+        mut planes: TilePlanes,
+        light: TilePlanes,
+        spp: f64,
+    ) -> Result<Described, CriterionError> {
         // Either sign of the difference of the halves is as good, and light has one: that which does not hang on which
         // half is which
         let sum: f64 = planes.residual.values().iter().map(|&r| f64::from(r)).sum();
@@ -351,10 +331,50 @@ impl Oracle {
             planes.residual.values_mut().iter_mut().for_each(|r| *r = -*r);
         }
         let residual = planes.residual.values_mut().iter_mut();
-        residual.zip(shown.values()).for_each(|(r, light)| *r += light);
-        let described = self.describe_tile(&planes, view.film.spp(tile.index) as f64).map(Some);
+        residual.zip(light.residual.values()).for_each(|(r, light)| *r += light);
+        light.recycle();
+        let described = self.describe_tile(&planes, spp);
         planes.recycle();
         described
+    }
+
+    /// Judges tiles of two finished pictures for an audience, by what they are like and, where only it could keep them open,
+    /// with the `light` that they are likely to lack, on the planes of the tile. `None` if nobody can tell what this audience sees.
+    pub(crate) fn judge_finished<E: From<CriterionError> + Send>(
+        &self,
+        described: Vec<Described>,
+        audience: Audience,
+        light: impl Fn(Tile) -> Result<Option<[TilePlanes; 2]>, E> + Sync,
+    ) -> Result<Option<Judged>, E> {
+        let Some(by_noise) = self.judge_finished_noise(&described, audience) else { return Ok(None) };
+        let enough = |verdict: Verdict| (verdict, verdict.converged);
+        let tiles: Vec<Tile> = described.iter().map(|d| d.place).collect();
+        let spp = described.first().map_or(1.0, |d| d.spp);
+        let mut described: Vec<Option<Described>> = described.into_iter().map(Some).collect();
+        let judge = |described: &[Option<Described>]| {
+            let described: Vec<Described> = described.iter().flatten().cloned().collect();
+            self.judge_finished_noise(&described, audience).into_iter().flatten().map(enough).collect()
+        };
+        let lit = |tile: Tile| -> Result<Option<Described>, E> {
+            match light(tile)? {
+                Some([planes, light]) => Ok(Some(self.with_light(planes, light, spp)?)),
+                None => Ok(None),
+            }
+        };
+        let by_noise = by_noise.into_iter().map(enough).collect();
+        let verdicts = judge_with_light(by_noise, &mut described, &tiles, judge, lit)?;
+        Ok(Some(Judged { verdicts, described }))
+    }
+
+    /// Judges the tiles of a picture by their noise, for an audience; `None` if the descriptor does not tell noise from picture,
+    /// and the audience is not [`Audience::TRAINED`].
+    fn judge_finished_noise(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
+        let numbers = self.model.parts().descriptor.in_picture(tiles);
+        let judge = |(tile, raw): (&Described, Vec<f32>)| match audience {
+            Audience::TRAINED => Some(self.verdict(&raw, tile.spp.round() as u64)),
+            _ => self.verdict_for(raw, tile.spp, audience),
+        };
+        tiles.iter().zip(numbers).map(judge).collect()
     }
 
     /// What stands before and after the share of people in the fingerprint.
@@ -389,7 +409,7 @@ impl Oracle {
     /// Judges the tiles that make up a picture, or as many as there are of it: people see a tile in its
     /// picture, and so does the model. One verdict a tile.
     pub fn judge_described(&self, tiles: &[Described]) -> Vec<Verdict> {
-        self.judge_all(tiles)
+        self.judge_finished_noise(tiles, Audience::TRAINED).unwrap_or_default()
     }
 
     /// Judges tiles as [`Oracle::judge_described`] does, for other eyes than those of the training data: P is
@@ -397,11 +417,7 @@ impl Oracle {
     /// `None` if that cannot be told, since the descriptor does not tell noise from picture, and the audience
     /// is not [`Audience::TRAINED`].
     pub fn judge_described_for(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
-        if audience == Audience::TRAINED {
-            return Some(self.judge_described(tiles));
-        }
-        let numbers = self.model.parts().descriptor.in_picture(tiles);
-        tiles.iter().zip(numbers).map(|(tile, raw)| self.verdict_for(raw, tile.spp, audience)).collect()
+        self.judge_finished_noise(tiles, audience)
     }
 
     /// The visible noise of a whole image, row-major, from its tiles as described; NaN where there is none of them.
@@ -416,6 +432,35 @@ impl Oracle {
     ) -> Option<Vec<f32>> {
         self.map_noise(grid, tiles, audience)
     }
+}
+
+/// Verdicts on these tiles: by noise, and of those that are enough by `judge` with the light that they may lack, as `lit`
+/// describes them; where that is not enough, they are open for it. `described` has then what each tile is judged by.
+fn judge_with_light<E: Send>(
+    by_noise: Vec<(Verdict, bool)>,
+    described: &mut [Option<Described>],
+    tiles: &[Tile],
+    judge: impl FnOnce(&[Option<Described>]) -> Vec<(Verdict, bool)>,
+    lit: impl Fn(Tile) -> Result<Option<Described>, E> + Sync,
+) -> Result<Vec<(Verdict, bool)>, E> {
+    let found: Vec<Option<Described>> = (tiles, &by_noise)
+        .into_par_iter()
+        .map(|(&tile, (_, enough))| if *enough { lit(tile) } else { Ok(None) })
+        .collect::<Result<_, _>>()?;
+    if found.iter().all(Option::is_none) {
+        return Ok(by_noise);
+    }
+    tiles
+        .iter()
+        .zip(found)
+        .filter(|(_, lit)| lit.is_some())
+        .for_each(|(tile, lit)| described[tile.index] = lit);
+    let with_light = judge(described);
+    let worse = |(noise, light): ((Verdict, bool), (Verdict, bool))| match (noise.1, light.1) {
+        (true, enough) => (Verdict { unmet: !enough, ..light.0 }, enough),
+        (false, _) => noise,
+    };
+    Ok(by_noise.into_iter().zip(with_light).map(worse).collect())
 }
 
 /// What each tile has met once.
@@ -518,8 +563,7 @@ impl StoppingCriterion for Oracle {
         self.described = all.par_iter().map(|&tile| describe(tile)).collect::<Result<_, _>>()?;
 
         // Tiles that were called converged without what has been met elsewhere since are judged again
-        let met = met_once(&self.described);
-        let unmet = Unmet::new(grid, &met, view.viewing);
+        let unmet = Unmet::new(grid, met_once(&self.described), view.viewing);
         let grown = |tile: &Tile| {
             let lacked = self.described[tile.index].as_ref().and_then(|seen| seen.lacked);
             !due[tile.index] && lacked.is_some_and(|was| unmet.light(view.film, *tile) > MORE * was)

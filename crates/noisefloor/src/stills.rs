@@ -6,10 +6,13 @@ use crate::display::exposure::{self, NoisyPixel};
 use crate::display::{Display, ToneMapping, luminance};
 pub use crate::evidence::{Evidence, Samples};
 use crate::evidence::{Rendering, TilePlanes, residual_scale};
+use crate::film::Film;
 use crate::nested::shared_samples;
-use crate::oracle::Oracle;
+use crate::oracle::{Judged, Oracle};
+use crate::params::Audience;
 use crate::rgb::Rgb;
-use crate::tile::{Tile, TileGrid};
+use crate::tile::{Tile, TileGrid, TilePixels};
+use crate::unmet::Unmet;
 use crate::watch::Encoding;
 use noisefloor_vision::Viewing;
 use rayon::prelude::*;
@@ -144,6 +147,9 @@ pub enum StillError {
          and their difference says nothing about noise"
     )]
     Unlike,
+    /// Eyes that the model cannot judge for.
+    #[error("the model does not tell noise from picture, and serves only the trained audience")]
+    Audience,
     /// The model does not fit the tiles.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
@@ -376,10 +382,42 @@ impl<'a> SnapshotPair<'a> {
     /// it had one; needs are then in multiples of what it has. [`SnapshotPair::notice`] says what speaks against
     /// the pictures.
     ///
+    /// Where the pictures are linear, what only one of them has met tells how much light both are likely to lack; a tile where
+    /// that would be seen is not converged ([`Verdict::unmet`]).
+    ///
     /// # Errors
-    /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.
-    pub fn judge(&self, oracle: &Oracle, grid: TileGrid) -> Result<Vec<Verdict>, StillError> {
-        Ok(oracle.judge_all(&self.describe_tiles(oracle, grid)?))
+    /// [`StillError`] if there is nothing to judge by, the model is for tiles of another size, or it cannot tell what this
+    /// audience sees.
+    pub fn judge(
+        &self,
+        oracle: &Oracle,
+        grid: TileGrid,
+        audience: Audience,
+    ) -> Result<JudgedTiles, StillError> {
+        let described = self.describe_tiles(oracle, grid)?;
+        let film = self.film(grid);
+        let unmet = film.as_ref().map(|film| (film, Unmet::of(film, &self.display, self.viewing)));
+        let light = |tile: Tile| -> Result<Option<[TilePlanes; 2]>, StillError> {
+            let shown = unmet.as_ref().and_then(|(film, unmet)| unmet.shown(film, &self.display, tile));
+            shown.map(|shown| Ok([self.planes_of(tile)?, shown])).transpose()
+        };
+        let judged = oracle.judge_finished(described, audience, light)?;
+        let Judged { verdicts, described } = judged.ok_or(StillError::Audience)?;
+        let verdicts = verdicts.into_iter().map(|(verdict, _)| verdict).collect();
+        let described = described.into_iter().flatten().collect();
+        Ok(JudgedTiles { verdicts, described, grid, audience })
+    }
+
+    /// A film of two pictures of linear light that share no samples; `None` if these are none.
+    fn film(&self, grid: TileGrid) -> Option<Film> {
+        let halves = match &self.basis {
+            _ if self.image.display_referred => return None,
+            Basis::Reference | Basis::Other(Samples::Nested) => return None,
+            Basis::Other(Samples::Independent) => [self.image, &self.pair[1]],
+            Basis::Rest(rest) => [self.image, rest],
+            Basis::Halves([a, b]) => [&**a, &**b],
+        };
+        Some(film_of(halves, grid))
     }
 
     /// What a tile is judged by.
@@ -445,6 +483,39 @@ impl<'a> SnapshotPair<'a> {
             |&tile: &Tile| Ok(oracle.describe_tile(&self.planes_of(tile)?, self.image.spp.max(1.0))?);
         tiles.par_iter().map(describe).collect()
     }
+}
+
+/// Verdicts on the tiles of a picture.
+#[derive(Clone, Debug)]
+pub struct JudgedTiles {
+    verdicts: Vec<Verdict>,
+    described: Vec<Described>,
+    grid: TileGrid,
+    audience: Audience,
+}
+
+impl JudgedTiles {
+    /// One for each tile, in their order.
+    pub fn verdicts(&self) -> &[Verdict] {
+        &self.verdicts
+    }
+
+    /// How visible the noise is at each pixel of the picture, row-major, as a multiple of what the audience just does not see.
+    /// `None` if the model of this oracle, which has judged, does not tell noise from picture.
+    pub fn visible_noise(&self, oracle: &Oracle) -> Option<Vec<f32>> {
+        oracle.map_noise(self.grid, &self.described, self.audience)
+    }
+}
+
+/// A film that has two pictures as its halves.
+pub(crate) fn film_of(halves: [&Still; 2], grid: TileGrid) -> Film {
+    let mut film = Film::new(grid);
+    let tiles: Vec<Tile> = grid.tiles().collect();
+    for half in halves {
+        let spp = half.spp.round().max(1.0) as u64;
+        film.add_tiles(spp, &tiles, |tile| TilePixels::in_image(tile, &half.pixels, grid.width()));
+    }
+    film
 }
 
 /// What the samples make that `more` has and `fewer` has not, which `more` contains.

@@ -27,12 +27,12 @@ mod search;
 pub use search::{CROP, Look, Looked, Search, Viewer, crops_for, drive};
 
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
-use crate::film::{Film, blend_row};
+use crate::film::blend_row;
 use crate::oracle::Oracle;
 use crate::params::Params;
 use crate::rgb::Rgb;
-use crate::stills::{SnapshotPair, Still, StillError, StillWarning};
-use crate::tile::{Tile, TileError, TileGrid, TilePixels};
+use crate::stills::{SnapshotPair, Still, StillError, StillWarning, film_of};
+use crate::tile::{Tile, TileError, TileGrid};
 use std::f64::consts::SQRT_2;
 use thiserror::Error;
 
@@ -348,7 +348,8 @@ impl PicturePair {
         self.notice(params)?;
         let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
         let tiles: Vec<Tile> = grid.tiles().collect();
-        let (film, pair) = (self.film(grid), self.compare(params));
+        let [one, other] = &self.halves;
+        let (film, pair) = (film_of([one, other], grid), self.compare(params));
         let (display, viewing) = (pair.display(), params.viewing);
         let view = View { film: &film, display, viewing, audience: params.audience, reference: None };
         let verdicts = oracle.clone().judge(&view, &tiles)?;
@@ -362,17 +363,6 @@ impl PicturePair {
         let ratio = ratio.max((doubted / film.spp(0) as f64).sqrt());
         let place = worst.map(|worst| (worst % self.size().0, worst / self.size().0));
         Ok((self.tell_apart(Excess { place, ..Excess::new(ratio) }), map))
-    }
-
-    /// The two pictures as halves.
-    fn film(&self, grid: TileGrid) -> Film {
-        let mut film = Film::new(grid);
-        let tiles: Vec<Tile> = grid.tiles().collect();
-        for half in &self.halves {
-            let spp = half.spp.round().max(1.0) as u64;
-            film.add_tiles(spp, &tiles, |tile| TilePixels::in_image(tile, &half.pixels, grid.width()));
-        }
-        film
     }
 
     /// An excess of these pictures, with what tells them from those of other settings: [`Excess::pictures`].

@@ -19,11 +19,12 @@
 //! draws it.
 
 use crate::display::{Display, luminance};
-use crate::evidence::{Plane, TilePlanes};
+use crate::evidence::TilePlanes;
 use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use noisefloor_vision::Viewing;
+use rayon::prelude::*;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -179,17 +180,26 @@ impl Rows {
 }
 
 /// What the tiles of a picture tell of light that they have not met.
-pub(crate) struct Unmet<'a> {
+#[derive(Debug)]
+pub struct Unmet {
     grid: TileGrid,
-    tiles: &'a [Option<MetOnce>],
+    tiles: Vec<Option<MetOnce>>,
     picture: MetOnce,
     /// Edge of a place in pixels.
     place: f64,
 }
 
-impl<'a> Unmet<'a> {
+impl Unmet {
+    /// By a film that keeps two halves, of which one without samples tells nothing.
+    pub fn of(film: &Film, display: &Display, viewing: Viewing) -> Self {
+        let grid = film.grid();
+        let tiles: Vec<Tile> = grid.tiles().collect();
+        let met = tiles.par_iter().map(|&tile| Some(MetOnce::of(film, display, tile))).collect();
+        Self::new(grid, met, viewing)
+    }
+
     /// `tiles` has what each tile of the grid has met once; `None` for one without evidence.
-    pub(crate) fn new(grid: TileGrid, tiles: &'a [Option<MetOnce>], viewing: Viewing) -> Self {
+    pub(crate) fn new(grid: TileGrid, tiles: Vec<Option<MetOnce>>, viewing: Viewing) -> Self {
         let picture = tiles.iter().flatten().fold(MetOnce::default(), |sum, &tile| sum.and(tile));
         let place = (PLACE * viewing.pixels_per_degree()).max(1.0);
         Self { grid, tiles, picture, place }
@@ -197,7 +207,7 @@ impl<'a> Unmet<'a> {
 
     /// Mean radiance that a tile is likely to lack: by the tiles around it or by the whole
     /// picture, whichever says more.
-    pub(crate) fn light(&self, film: &Film, tile: Tile) -> f64 {
+    pub fn light(&self, film: &Film, tile: Tile) -> f64 {
         let Some(own) = self.tiles[tile.index] else { return 0.0 };
         let (columns, rows) = (self.grid.columns(), self.grid.rows());
         let (column, row) = (tile.index % columns, tile.index / columns);
@@ -211,9 +221,8 @@ impl<'a> Unmet<'a> {
     }
 
     /// What this would change on the screen if it fell on the tile and all around it, in places as large as
-    /// people look at: the residual of luminance Y′, in the shape of the tile's planes. `None` if that is
-    /// nothing.
-    pub(crate) fn shown(&self, film: &Film, display: &Display, tile: Tile) -> Option<Plane> {
+    /// people look at: as the residual of luminance Y′ of the tile's planes, whose image is 0. `None` if that is nothing.
+    pub fn shown(&self, film: &Film, display: &Display, tile: Tile) -> Option<TilePlanes> {
         let light = self.light(film, tile);
         let most = (PEAK * light) as f32;
         let step = |on: f32| display.luma([on + most; 3]) - display.luma([on; 3]);
@@ -223,12 +232,11 @@ impl<'a> Unmet<'a> {
         }
         let width = self.grid.width();
         let wave = |at: usize| 1.0 + libm::cos(TAU * at as f64 / self.place);
-        let planes = TilePlanes::gather(self.grid.size(), tile, |x, y| {
+        Some(TilePlanes::gather(self.grid.size(), tile, |x, y| {
             let dark = film.pixel(tile.owner(self.grid, x, y), y * width + x);
             let more = (light * wave(x) * wave(y)) as f32;
             ([0.0; 3], [display.luma(dark.map(|c| c + more)) - display.luma(dark); 3])
-        });
-        Some(planes.residual)
+        }))
     }
 }
 

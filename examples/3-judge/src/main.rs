@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
-    Oracle, TileGrid, ToneMapping,
+    Audience, Oracle, TileGrid, ToneMapping,
     stills::{Samples, SnapshotPair, Still},
     tile::DEFAULT_TILE,
 };
@@ -39,7 +39,8 @@ fn run() -> Result<(), Box<dyn Error>> {
         eprintln!("warning: {warning}");
     }
     let mut converged = 0;
-    for (tile, verdict) in grid.tiles().zip(pair.judge(&oracle, grid)?) {
+    let judged = pair.judge(&oracle, grid, Audience::TRAINED)?;
+    for (tile, verdict) in grid.tiles().zip(judged.verdicts()) {
         let says = match verdict.expected_spp {
             _ if verdict.converged => "no noise seen".into(),
             Some(expected) => format!("noise seen; clean at about {expected} spp"),

@@ -1,7 +1,7 @@
 use crate::kit::{SIZE, Simple, noisy, truth};
 use noisefloor::{
-    Film, Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, Tile, TileGrid,
-    ToneMapping, Verdict, Viewing,
+    Checkpoint, Film, Params, Rgb, Schedule, Session, SessionError, StopReason, StoppingCriterion, Tile,
+    TileGrid, ToneMapping, Verdict, Viewing,
     criterion::{CriterionError, View},
     display::Display,
     source::FirstHits,
@@ -490,4 +490,87 @@ fn pictures_of_a_single_row_or_column_are_done() {
             "{size:?}"
         );
     }
+}
+
+/// A sample that finds light in a tile.
+#[derive(Clone, Copy)]
+struct Find {
+    tile: usize,
+    pixel: usize,
+    sample: u64,
+    light: f32,
+}
+
+/// Pushes what is asked for of both halves, and judges.
+fn round_with<D: Denoiser>(session: &mut Session<DenoisedQuality<D>>, find: Find) {
+    push_with(session, find);
+    push_with(session, find);
+    session.judge().unwrap();
+}
+
+fn push_with<D: Denoiser>(session: &mut Session<DenoisedQuality<D>>, find: Find) {
+    for request in session.requests() {
+        let seed = 1000 * request.first + request.tile.index as u64;
+        let striped = [0, 3].contains(&request.tile.index);
+        let deviation = if striped { NOISE } else { 0.1 * NOISE };
+        let mut picture = noisy(seed, deviation / (request.spp as f32).sqrt());
+        let batch = request.first..request.first + request.spp;
+        if request.tile.index == find.tile && batch.contains(&find.sample) {
+            picture[find.pixel] = [find.light / request.spp as f32; 3];
+        }
+        let tile: Vec<_> = request.tile.rows(SIZE.0).flatten().map(|i| picture[i]).collect();
+        session.push(request.tile.index, request.spp, &tile).unwrap();
+    }
+}
+
+/// A session with a denoiser that knows the wall, and takes away whatever else was found.
+fn knows_the_wall() -> Session<DenoisedQuality<Simple>> {
+    session(Simple::Flat(0.3))
+}
+
+#[test]
+fn a_denoised_tile_is_open_while_light_is_unmet_that_would_be_seen() {
+    let unmet = |light: f32| {
+        let mut session = knows_the_wall();
+        let find = Find { tile: 4, pixel: 100 * SIZE.0 + 90, sample: 3, light };
+        round_with(&mut session, find);
+        // Tile 4 has had its share
+        assert!(!session.verdict(4).unwrap().unmet);
+        [1, 2, 5].map(|tile| {
+            let verdict = session.verdict(tile).unwrap();
+            assert_eq!(verdict.unmet, !verdict.converged, "{tile}: {verdict:?}");
+            assert_eq!(verdict.unmet, verdict.expected_spp.is_none_or(|spp| spp > 20), "{tile}: {verdict:?}");
+            verdict.unmet
+        })
+    };
+    assert_eq!(unmet(0.3), [false; 3]);
+    // Over all tiles, and with the place where it may lie, 20 samples of which one has 60 lack 3 in 25,000 pixels, 1/2,500 of the wall
+    assert_eq!(unmet(60.0), [false; 3]);
+    // A fifth of it
+    assert_eq!(unmet(3e4), [true; 3]);
+}
+
+#[test]
+fn what_is_found_late_opens_denoised_tiles_that_had_stopped_and_does_after_a_resume() {
+    // Stripes are lost on this denoiser, so that tiles 0 and 3 go on
+    let find = Find { tile: 3, pixel: 100 * SIZE.0 + 30, sample: 50, light: 1e5 };
+    let mut session = knows_the_wall();
+    round_with(&mut session, find);
+    let open = |session: &Session<_>| (0..6).filter(|&tile| session.is_open(tile)).collect::<Vec<_>>();
+    assert_eq!(open(&session), [0, 3]);
+    let lost = session.verdict(4).unwrap().lost;
+    let mut bytes = Vec::new();
+    session.checkpoint("late").unwrap().write(&mut bytes).unwrap();
+    let mut resumed = knows_the_wall().resume("late", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+    while open(&session).len() == 2 {
+        [&mut session, &mut resumed].into_iter().for_each(|session| round_with(session, find));
+        assert!(session.film().spp(3) < 1_000, "nothing opens");
+    }
+    assert!(session.film().spp(3) >= 50);
+    assert_eq!(open(&session), [0, 1, 2, 3, 4, 5]);
+    for tile in 0..6 {
+        assert_eq!(session.verdict(tile), resumed.verdict(tile), "{tile}");
+    }
+    let verdict = session.verdict(4).unwrap();
+    assert!(verdict.unmet && verdict.lost == lost, "{verdict:?}");
 }

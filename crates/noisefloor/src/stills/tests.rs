@@ -65,3 +65,36 @@ fn the_same_picture_is_not_pooled_with_itself() {
     let error = SnapshotPair::new(Evidence::Halves, &plain(&image), &twice, tone, samples).unwrap_err();
     assert!(matches!(error, StillError::Twice(_)), "{error}");
 }
+
+/// A wall of 128×128 pixels, rendered twice with 512 samples, of which one alone has found a lamp in the first of 16 tiles: the others are
+/// likely to lack it, whichever picture has it, in any unit of light. Of the picture on a screen nobody knows what was found.
+#[test]
+fn finished_pictures_lack_light_that_one_alone_has_met() {
+    const EDGE: usize = 128;
+    let grid = TileGrid::new(EDGE, EDGE, 32).unwrap();
+    let wall = |seed: u64, unit: f32, lamp: f32| {
+        let mut noise = noisefloor_testkit::Noise::keyed(&[23, seed]);
+        let mut pixel = || unit * 0.2 * (1.0 + 0.05 * noise.normal() / f64::sqrt(512.0)) as f32;
+        let mut pixels: Vec<Rgb> = (0..EDGE * EDGE).map(|_| [pixel(); 3]).collect();
+        pixels[5 * EDGE + 6] = [unit * (0.2 + lamp); 3];
+        Still::new((EDGE, EDGE), pixels, 512.0)
+    };
+    let unmet = |a: &Still, b: &Still| {
+        let (tone, how) = (ToneMapping::default(), Some(Samples::Independent));
+        let pair = SnapshotPair::new(Evidence::Halves, a, &[b], tone, how).unwrap();
+        let judged = pair.judge(&Oracle::bundled(), grid, Audience::TRAINED).unwrap();
+        // The windows of tiles 1, 4 and 5 have it in sight
+        let beyond = [2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15].map(|tile| judged.verdicts()[tile]);
+        assert!(beyond.iter().all(|verdict| verdict.unmet != verdict.converged), "{beyond:?}");
+        beyond.iter().filter(|verdict| verdict.unmet).count()
+    };
+    for unit in [1.0, 1e-6, 1e6] {
+        let [plain, lit] = [0.0, 2000.0].map(|lamp| wall(1, unit, lamp));
+        let other = wall(2, unit, 0.0);
+        assert_eq!(unmet(&plain, &other), 0, "{unit}");
+        assert_eq!(unmet(&lit, &other), 12, "{unit}");
+        assert_eq!(unmet(&other, &lit), 12, "{unit}");
+        let shown = |still: &Still| still.clone().displayed_as_it_is(0.0);
+        assert_eq!(unmet(&shown(&lit), &shown(&other)), 0, "{unit}");
+    }
+}

@@ -47,7 +47,7 @@ fn all_exposed(film: &Film, exposure: f32) -> Vec<Option<MetOnce>> {
 /// The most that a tile lacks, as a share of the picture's light.
 fn most(film: &Film) -> f64 {
     let met = all(film);
-    let unmet = Unmet::new(grid(), &met, Viewing::default());
+    let unmet = Unmet::new(grid(), met, Viewing::default());
     grid().tiles().map(|tile| unmet.light(film, tile)).fold(0.0, f64::max) / f64::from(BASE)
 }
 
@@ -60,7 +60,7 @@ fn one_find_may_lie_anywhere_around_it_and_in_the_picture() {
     let film = film([&dotted, &flat], [5, 5]);
     let met = all(&film);
     assert!((met[0].unwrap().light - 7.0).abs() < 1e-5, "{met:?}");
-    let unmet = Unmet::new(grid(), &met, Viewing::default());
+    let unmet = Unmet::new(grid(), met, Viewing::default());
     let place = (PLACE * Viewing::default().pixels_per_degree()).powi(2);
     let spread = |pixels: usize| 7.0 / (pixels as f64 + place);
     let light = |index: usize| unmet.light(&film, grid().tile(index));

@@ -6,11 +6,10 @@ mod report;
 pub use denoised::DenoisedJob;
 
 use anyhow::Context;
-use noisefloor::descriptor::Described;
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     evidence::{Evidence, Samples},
-    stills::{SnapshotPair, Still, StillWarning},
+    stills::{JudgedTiles, SnapshotPair, Still, StillError, StillWarning},
 };
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::start_threads;
@@ -91,10 +90,14 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
     let noticed = held.notice(grid)?;
     warn_of(&noticed.warnings);
     let unlike = noticed.unlike;
-    let described = held.describe(&job.oracle, grid)?;
-    let rows = judge(job, grid, (image.spp, &described), &unlike)?;
+    let judged = held.judge(&job.oracle, grid, job.audience).map_err(|error| match error {
+        StillError::Audience => anyhow::Error::new(error)
+            .context("this model cannot judge for other eyes than those it has learned from; --eyes none"),
+        error => error.into(),
+    })?;
+    let rows = rows(grid, image.spp, &judged, &unlike);
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
-    draw(job, &image, grid, (&held, &described), &rows)
+    draw(job, &image, grid, (&held, &judged), &rows)
 }
 
 /// A picture that can be judged; errors name it.
@@ -129,19 +132,14 @@ fn warn_of(warnings: &[StillWarning]) {
 }
 
 /// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.
-fn judge(
-    job: &JudgeJob,
-    grid: TileGrid,
-    (spp, described): (f64, &[Described]),
-    unlike: &[bool],
-) -> anyhow::Result<Vec<Row>> {
+fn rows(grid: TileGrid, spp: f64, judged: &JudgedTiles, unlike: &[bool]) -> Vec<Row> {
     // Of less than one sample, the tile was judged as if it had one: what it needs is in its own samples
     let fewer = spp.min(1.0);
     let samples = |n: u64| (n as f64 * fewer).ceil() as u64;
-    let row = |(tile, verdict): (Tile, Verdict)| {
+    let row = |(tile, &verdict): (Tile, &Verdict)| {
         let unlike = unlike[tile.index];
         let verdict = if unlike { Verdict::default() } else { verdict };
-        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, .. } = verdict;
+        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, unmet, .. } = verdict;
         let Tile { index, x, y, width, height } = tile;
         let probability = probability.unwrap_or(0.0);
         Row {
@@ -155,13 +153,11 @@ fn judge(
             threshold: threshold.map(|threshold| threshold.map(samples)),
             expected_spp: expected_spp.map(samples),
             unfamiliar,
+            unmet,
             unlike,
         }
     };
-    let verdicts = job.oracle.judge_described_for(described, job.audience);
-    let verdicts = verdicts
-        .context("this model cannot judge for other eyes than those it has learned from; --eyes none")?;
-    Ok(grid.tiles().zip(verdicts).map(row).collect())
+    grid.tiles().zip(judged.verdicts()).map(row).collect()
 }
 
 /// Draws what was asked for.
@@ -169,12 +165,12 @@ fn draw(
     job: &JudgeJob,
     image: &Still,
     grid: TileGrid,
-    (held, described): (&SnapshotPair<'_>, &[Described]),
+    (held, judged): (&SnapshotPair<'_>, &JudgedTiles),
     rows: &[Row],
 ) -> anyhow::Result<()> {
     let width = grid.width();
     let wants_noise = job.noise_map.is_some() || job.exr.is_some();
-    let noise = wants_noise.then(|| job.oracle.map_visible_noise(grid, described, job.audience)).flatten();
+    let noise = wants_noise.then(|| judged.visible_noise(&job.oracle)).flatten();
     if let (Some(path), Some(noise)) = (&job.noise_map, &noise) {
         draw_field(&Canvas::of_picture(width, &held.shown()), noise, &NOISE_SCALE).save(path)?;
     }

@@ -22,6 +22,8 @@ pub(super) struct Row {
     /// Whether its texture is unlike any that the model has been tested on; P is then that of half the
     /// samples.
     pub(super) unfamiliar: bool,
+    /// Whether it is not converged only for light that neither picture may have met.
+    pub(super) unmet: bool,
     /// Whether the pictures differ there by more than noise: it is not judged then, and P is 0.
     pub(super) unlike: bool,
 }
@@ -69,6 +71,7 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
         let verdict = match row {
             Row { unlike: true, .. } => "not judged",
             Row { converged: true, .. } => "converged",
+            Row { unmet: true, .. } => "light?",
             _ => "noise seen",
         };
         let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
@@ -90,6 +93,12 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
         report.spp,
         report.people
     )?;
+    let unmet = report.tiles.iter().filter(|row| row.unmet).count();
+    if unmet > 0 {
+        say!(
+            "tiles whose noise is not seen, but which are likely to lack light that few samples have met: {unmet} (light?)"
+        )?;
+    }
     if report.unfamiliar_tiles > 0 {
         say!(
             "tiles with texture or light unlike any that the model was tested on: {}; their P is that of fewer samples, down to half, and less certain",
