@@ -1,6 +1,7 @@
 //! Bands of spatial frequency, and what is worked out once for a display.
 
 use crate::csf::{KNOTS, by_luminance};
+use crate::lanes::map_rows;
 use crate::masking::{CHANNEL_GAINS, SENSITIVITY_DB};
 use crate::math::exp2;
 use crate::pyramid::Size;
@@ -84,12 +85,16 @@ fn curves(frequency: f64, contrast: f64) -> [Curve; ALL_CHANNELS] {
 /// log₂ of the sensitivities at places between the knots.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn sensitivity_row(curve: &Curve, places: &[f32], out: &mut [f32]) {
-    for (out, &place) in out.iter_mut().zip(places) {
+    /// Adding it to a number below it leaves the nearest integer in the lowest bits.
+    const WHOLE: f32 = (1 << 23) as f32;
+    map_rows([places], [out], |[place]| {
+        // Rounded down by hand: a cast keeps what is no integer from being one, number by number
+        let near = (place + WHOLE) - WHOLE;
+        let low = if near > place { near - 1.0 } else { near };
         // Places lie within 0…KNOTS − 1; the remainder says so to the compiler
-        let low = place as i32;
-        let knot = low as usize % KNOTS;
-        *out = curve.values[knot] + curve.steps[knot] * (place - low as f32);
-    }
+        let knot = (low + WHOLE).to_bits() as usize % KNOTS;
+        [curve.values[knot] + curve.steps[knot] * (place - low)]
+    });
 }
 
 /// Sensitivity at one place between the knots.

@@ -2,6 +2,7 @@
 
 use crate::bands::{Bands, sensitivity, sensitivity_row};
 use crate::csf::{KNOTS, place};
+use crate::lanes::map_rows;
 use crate::masking::{
     BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_row, transient_row,
 };
@@ -173,7 +174,7 @@ impl Engine {
             Adapted::ToBoth => {
                 let mean = &mut rows.mean[columns.clone()];
                 let [test, reference] = [0, 1].map(|of| &coarse[of][0][columns.clone()]);
-                mean.iter_mut().zip(test).zip(reference).for_each(|((mean, a), b)| *mean = 0.5 * (a + b));
+                mean_row(test, reference, mean);
                 [&*mean; 2]
             }
         };
@@ -280,10 +281,16 @@ pub(crate) fn collapse(
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 fn place_row(luminances: &[f32], places: &mut [f32]) {
     const LAST: f32 = (KNOTS - 1) as f32;
-    for (out, &luminance) in places.iter_mut().zip(luminances) {
+    map_rows([luminances], [places], |[luminance]| {
         let at = place(if luminance > 0.01 { luminance } else { 0.01 });
-        *out = if at < LAST { at } else { LAST };
-    }
+        [if at < LAST { at } else { LAST }]
+    });
+}
+
+/// The mean of two rows.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn mean_row(a: &[f32], b: &[f32], mean: &mut [f32]) {
+    map_rows([a, b], [mean], |[a, b]| [0.5 * (a + b)]);
 }
 
 /// Row `padded` − [`BLUR_RADIUS`] of `height`, reflected at the border, which is not repeated.

@@ -46,6 +46,7 @@ mod chromaticity;
 mod csf;
 mod engine;
 mod error;
+mod lanes;
 mod masking;
 mod math;
 mod model;

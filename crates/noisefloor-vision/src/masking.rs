@@ -2,6 +2,7 @@
 //! large differences (Mantiuk et al. 2024, §3.5 to §3.6), with the constants of `cvvdp_parameters.json`
 //! 0.5.7.
 
+use crate::lanes::{change_row, map_rows};
 use crate::math::{exp2, pow};
 use crate::photometry::CHANNELS;
 use crate::temporal::{ALL_CHANNELS, TRANSIENT};
@@ -66,21 +67,26 @@ pub(crate) fn contrast_row(
     difference: &mut [f32],
     smaller: &mut [f32],
 ) {
-    let n = difference.len();
-    let (tf, tc, tb) = (&test.fine[..n], &test.coarse[..n], &test.background[..n]);
-    let (rf, rc, rb) = (&reference.fine[..n], &reference.coarse[..n], &reference.background[..n]);
-    let (sensitivity, smaller) = (&sensitivity[..n], &mut smaller[..n]);
     let weber = |fine: f32, coarse: f32, background: f32| {
         let contrast = (fine - coarse) / (if background > 0.01 { background } else { 0.01 });
         if contrast < LARGEST_CONTRAST { contrast } else { LARGEST_CONTRAST }
     };
-    for x in 0..n {
-        let (t, r) = (weber(tf[x], tc[x], tb[x]), weber(rf[x], rc[x], rb[x]));
-        let s = exp2(sensitivity[x]);
-        difference[x] = (t - r).abs() * s;
+    let rows = [
+        test.fine,
+        test.coarse,
+        test.background,
+        reference.fine,
+        reference.coarse,
+        reference.background,
+        sensitivity,
+    ];
+    map_rows(rows, [difference, smaller], |[tf, tc, tb, rf, rc, rb, sensitivity]| {
+        let (t, r) = (weber(tf, tc, tb), weber(rf, rc, rb));
+        let s = exp2(sensitivity);
+        let difference = (t - r).abs() * s;
         let (t, r) = (t.abs(), r.abs());
-        smaller[x] = (if t < r { t } else { r }) * s;
-    }
+        [difference, (if t < r { t } else { r }) * s]
+    });
 }
 
 /// Contrasts of noise in the transient channel, in units of the threshold: there, the reference is zero.
@@ -101,24 +107,25 @@ pub(crate) fn transient_row(noise: Row<'_>, sensitivity: &[f32], difference: &mu
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn blur_row(blur: &Blur, padded: &[f32], out: &mut [f32]) {
     let n = out.len();
-    blend(blur, std::array::from_fn(|i| &padded[i..][..n]), out);
+    let mut rows: [&[f32]; 2 * BLUR_RADIUS + 1] = [&[]; 2 * BLUR_RADIUS + 1];
+    for (i, row) in rows.iter_mut().enumerate() {
+        *row = &padded[i..i + n];
+    }
+    blend(blur, rows, out);
 }
 
 /// Blurs across thirteen rows as long as `out`.
 #[inline(always)]
 fn blend(blur: &Blur, rows: [&[f32]; 2 * BLUR_RADIUS + 1], out: &mut [f32]) {
-    let n = out.len();
-    // Written out, so that it compiles to vector instructions
-    let [f, e, d, c, b, a, centre, g, h, i, j, k, l] = rows.map(|row| &row[..n]);
-    for x in 0..n {
-        out[x] = blur[0] * centre[x]
-            + blur[1] * (a[x] + g[x])
-            + blur[2] * (b[x] + h[x])
-            + blur[3] * (c[x] + i[x])
-            + blur[4] * (d[x] + j[x])
-            + blur[5] * (e[x] + k[x])
-            + blur[6] * (f[x] + l[x]);
-    }
+    map_rows(rows, [out], |[f, e, d, c, b, a, centre, g, h, i, j, k, l]| {
+        [blur[0] * centre
+            + blur[1] * (a + g)
+            + blur[2] * (b + h)
+            + blur[3] * (c + i)
+            + blur[4] * (d + j)
+            + blur[5] * (e + k)
+            + blur[6] * (f + l)]
+    });
 }
 
 /// A limited difference d = L·u/(L + u) after the unlimited u has been multiplied by `growth`.
@@ -172,7 +179,7 @@ pub(crate) fn mask_row<const N: usize>(
     differences.into_iter().enumerate().for_each(|(channel, row)| channels[channel] = Some(row));
     channels[TRANSIENT] = transient;
     let mut powers = [[0.0; PIXELS]; N];
-    let mut mask = [0.0; PIXELS];
+    let [mut mask, mut visible] = [[0.0; PIXELS]; 2];
     for from in (0..width).step_by(PIXELS) {
         let n = PIXELS.min(width - from);
         for (channel, power) in powers.iter_mut().enumerate() {
@@ -182,7 +189,7 @@ pub(crate) fn mask_row<const N: usize>(
                 None => power.copy_from_slice(rows[BLUR_RADIUS]),
             }
             let (exponent, offset) = (MASK_EXPONENTS[channel], masking.offsets[channel]);
-            power.iter_mut().for_each(|value| *value = safe_pow(*value * MASK_GAIN, exponent, offset));
+            change_row(power, |value| safe_pow(value * MASK_GAIN, exponent, offset));
         }
         for (channel, out) in channels.iter_mut().enumerate() {
             let Some(out) = out else { continue };
@@ -192,10 +199,12 @@ pub(crate) fn mask_row<const N: usize>(
                 let weight = weights[channel];
                 mask.iter_mut().zip(power).for_each(|(mask, power)| *mask += weight * power);
             }
-            for (out, mask) in out[from..][..n].iter_mut().zip(&*mask) {
-                let difference = safe_pow(*out, EXPONENT, masking.offset) / mask;
-                *out = LARGEST * difference / (LARGEST + difference);
-            }
+            let row = &mut out[from..][..n];
+            visible[..n].copy_from_slice(row);
+            map_rows([&visible[..n], mask], [row], |[difference, mask]| {
+                let difference = safe_pow(difference, EXPONENT, masking.offset) / mask;
+                [LARGEST * difference / (LARGEST + difference)]
+            });
         }
     }
 }

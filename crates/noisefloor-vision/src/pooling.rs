@@ -1,6 +1,7 @@
 //! From visible differences to just-objectionable differences (Mantiuk et al. 2024, §3.7), with the constants
 //! of `cvvdp_parameters.json` 0.5.7.
 
+use crate::lanes::{change_row, map_rows};
 use crate::masking::{EPSILON, EXPONENT, grown};
 use crate::math::pow;
 use crate::temporal::{ALL_CHANNELS, TRANSIENT_WEIGHT};
@@ -94,7 +95,7 @@ pub(crate) fn across_row<const N: usize>(
     out: &mut [f32],
 ) {
     if N == 1 && transient.is_none() {
-        out.iter_mut().zip(planes[0]).for_each(|(out, &d)| *out = weight * grown(d, growth));
+        map_rows([planes[0]], [out], |[d]| [weight * grown(d, growth)]);
         return;
     }
     out.fill(0.0);
@@ -115,10 +116,8 @@ pub(crate) fn across_row<const N: usize>(
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn energy_row(row: &mut [f32]) {
     const POWER: f32 = 2.0 / EXPONENT;
-    for value in row {
-        // A logarithm of 0 is finite here, and no number that means something
-        *value = if *value > 1e-30 { pow(*value, POWER) } else { 0.0 };
-    }
+    // A logarithm of 0 is finite here, and no number that means something
+    change_row(row, |value| if value > 1e-30 { pow(value, POWER) } else { 0.0 });
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use crate::display::{Display, luma_row, luminance};
 use crate::film::{Film, blend_row, weights};
 pub use crate::plane::Plane;
 use crate::rgb::Rgb;
-use crate::tile::Tile;
+use crate::tile::{Tile, TileGrid};
+use multiversion::multiversion;
 use noisefloor_vision::Viewing;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
@@ -42,6 +43,19 @@ struct Columns {
 }
 
 impl Columns {
+    /// Runs of columns that show one column of tiles, with the place of that in the grid.
+    fn by_tile(&self, grid: TileGrid) -> Vec<(Range<usize>, usize)> {
+        let mut runs: Vec<(Range<usize>, usize)> = Vec::new();
+        for (at, &x) in self.all.iter().enumerate() {
+            let column = grid.index_at(x, 0);
+            match runs.last_mut() {
+                Some((run, of)) if *of == column => run.end = at + 1,
+                _ => runs.push((at..at + 1, column)),
+            }
+        }
+        runs
+    }
+
     /// Takes a row of the planes from one of the image.
     fn read(&self, image: &[Rgb], row: &mut [Rgb]) {
         let Range { start, end } = self.inside;
@@ -126,7 +140,7 @@ impl TilePlanes {
         tile: Tile,
         display: &Display,
         mut read: impl FnMut(usize, &Columns, [&mut [Rgb]; N], [&mut [f32]; 2]),
-        pixel: impl Fn([f32; N], [f32; 2]) -> [f32; 2],
+        pixel: impl Fn([f32; N], [f32; 2]) -> [f32; 2] + Copy,
     ) -> Self {
         Self::fill(size, tile, |y, columns, scratch, image, residual| {
             let width = columns.all.len();
@@ -137,10 +151,7 @@ impl TilePlanes {
             let pictures = std::array::from_fn(|_| pictures.next().expect("one for each picture"));
             read(y, columns, pictures, [&mut *image, &mut *residual]);
             luma_row(display, linear, shown);
-            for (i, (image, residual)) in image.iter_mut().zip(residual).enumerate() {
-                let of_pixel = std::array::from_fn(|n| shown[n * width + i]);
-                [*image, *residual] = pixel(of_pixel, [*image, *residual]);
-            }
+            pixel_row(shown, image, residual, pixel);
         })
     }
 
@@ -186,6 +197,7 @@ impl TilePlanes {
     /// are the same to the bit but for the sign of the residual.
     pub fn from_halves(film: &Film, display: &Display, tile: Tile) -> Self {
         let grid = film.grid();
+        let mut runs = Vec::new();
         let read = |y, columns: &Columns, [mean, a, b]: [&mut [Rgb]; 3], [of_a, of_b]: [&mut [f32]; 2]| {
             for (half, row) in [&mut *a, &mut *b].into_iter().enumerate() {
                 match film.half_row(half, y) {
@@ -195,24 +207,23 @@ impl TilePlanes {
             }
             // The numbers of samples change from tile to tile, and from pixel to pixel where some were kept
             // out.
-            let owner = |i: usize| tile.owner(grid, columns.all[i], y);
-            // The tile's own columns have one owner, in whatever row
-            let own = HALO..HALO + tile.width;
-            let mut from = 0;
-            while from < mean.len() {
-                let of = owner(from);
-                let alike = |&i: &usize| film.rejected() == 0 && i != own.start && owner(i) == of;
-                let to = if from == own.start && film.rejected() == 0 {
-                    own.end
-                } else {
-                    from + 1 + (from + 1..mean.len()).take_while(alike).count()
-                };
-                let counts = film.pixel_counts(of, y * grid.width() + columns.all[from]);
+            let row_of_tiles = grid.index_at(0, y);
+            let mut blend = |Range { start: from, end: to }: Range<usize>, column: usize| {
+                let counts = film.pixel_counts(row_of_tiles + column, y * grid.width() + columns.all[from]);
                 let weights = weights(counts.map(|n| n as f64));
                 blend_row([&a[from..to], &b[from..to]], weights, &mut mean[from..to]);
                 of_a[from..to].fill(weights[0]);
                 of_b[from..to].fill(weights[1]);
-                from = to;
+            };
+            if runs.is_empty() {
+                runs = columns.by_tile(grid);
+            }
+            for (run, column) in &runs {
+                if film.rejected() == 0 {
+                    blend(run.clone(), *column);
+                } else {
+                    run.clone().for_each(|at| blend(at..at + 1, *column));
+                }
             }
         };
         Self::gather_linear(grid.size(), tile, display, read, of_mean)
@@ -285,12 +296,33 @@ impl TilePlanes {
     }
 }
 
+/// Image and residual of a row, which hold two numbers for each pixel, from these and `N` pictures, whose rows follow one
+/// another.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn pixel_row<const N: usize, F: Fn([f32; N], [f32; 2]) -> [f32; 2]>(
+    shown: &[f32],
+    image: &mut [f32],
+    residual: &mut [f32],
+    pixel: F,
+) {
+    let width = image.len();
+    let (shown, residual) = (&shown[..N * width], &mut residual[..width]);
+    for i in 0..width {
+        let mut of_pixel = [0.0; N];
+        for (n, value) in of_pixel.iter_mut().enumerate() {
+            *value = shown[n * width + i];
+        }
+        [image[i], residual[i]] = pixel(of_pixel, [image[i], residual[i]]);
+    }
+}
+
 /// Image and residual of a pixel from the display luminances of the mean of all samples and of both halves, and the
 /// weights of these in the mean, 0 where one of them has no samples.
 ///
 /// Where the display is as good as linear, the mean lies between the halves as its weights say, and is the middle of
 /// what is compared. At a white dot that one half alone has, it is as white as that half: what is seen of the dot is then
 /// not its share, but all that the two differ by, and the middle lies halfway between them.
+#[inline(always)]
 fn of_mean([mean, a, b]: [f32; 3], [of_a, of_b]: [f32; 2]) -> [f32; 2] {
     let apart = (a - b).abs();
     let held = held([mean, a, b], [of_a, of_b]);
@@ -303,6 +335,7 @@ fn of_mean([mean, a, b]: [f32; 3], [of_a, of_b]: [f32; 2]) -> [f32; 2] {
 /// it is as bright as that half. Squared, so that the bend of a tone curve within the noise counts for nothing. Where the
 /// brighter half has nearly all samples, the mean is as bright as that half in any case: below a fiftieth of the samples,
 /// the darker half tells the less, the fewer it has.
+#[inline(always)]
 pub fn held([mean, a, b]: [f32; 3], [of_a, of_b]: [f32; 2]) -> f32 {
     let linear = of_a * a + of_b * b;
     let of_darker = if a < b { of_a } else { of_b };

@@ -1,6 +1,6 @@
 //! The film: batches of every tile, in two independent halves.
 
-use crate::display::exposure::{self, NoisyPixel};
+use crate::display::exposure::{self, NoisyBlock, NoisyPixel};
 use crate::display::{Settled, ToneMapping, luminance};
 use crate::rgb::Rgb;
 use crate::source::{Request, Sequence};
@@ -168,15 +168,21 @@ pub(crate) fn weights([a, b]: [f64; 2]) -> [f32; 2] {
 
 /// The means of two halves in a row of pixels, by their weights: the same bits whichever half is which, and what both
 /// have where they are equal.
-#[inline]
-pub(crate) fn blend_row([a, b]: [&[Rgb]; 2], [of_a, of_b]: [f32; 2], mean: &mut [Rgb]) {
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn blend_row([a, b]: [&[Rgb]; 2], weights: [f32; 2], mean: &mut [Rgb]) {
     let halves = a.as_flattened().iter().zip(b.as_flattened());
-    mean.as_flattened_mut().iter_mut().zip(halves).for_each(|(mean, (&a, &b))| {
-        let (low, high, of_high) = if a < b { (a, b, of_b) } else { (b, a, of_a) };
-        let near = low + (high - low) * of_high;
-        // The difference of two huge values may be none
-        *mean = if near.is_finite() { near } else { low * (1.0 - of_high) + high * of_high };
-    });
+    for (mean, (&a, &b)) in mean.as_flattened_mut().iter_mut().zip(halves) {
+        *mean = blend([a, b], weights);
+    }
+}
+
+/// [`blend_row`] of one number.
+#[inline(always)]
+fn blend([a, b]: [f32; 2], [of_a, of_b]: [f32; 2]) -> f32 {
+    let (low, high, of_high) = if a < b { (a, b, of_b) } else { (b, a, of_a) };
+    let near = low + (high - low) * of_high;
+    // The difference of two huge values may be none
+    if near.is_finite() { near } else { low * (1.0 - of_high) + high * of_high }
 }
 
 /// Accumulates batches of each tile into two independent halves, A and B.
@@ -498,9 +504,21 @@ impl Film {
     #[inline]
     pub fn pixel(&self, tile: usize, pixel: usize) -> Rgb {
         let [(a, na), (b, nb)] = self.pixel_halves(tile, pixel);
-        let mut mean = [[0.0; 3]];
-        blend_row([&[a], &[b]], weights([na as f64, nb as f64]), &mut mean);
-        mean[0]
+        let weights = weights([na as f64, nb as f64]);
+        std::array::from_fn(|c| blend([a[c], b[c]], weights))
+    }
+
+    /// [`Film::pixel`] of many pixels of a tile.
+    pub(crate) fn pixels_of(&self, tile: usize) -> impl Fn(usize) -> Rgb {
+        // As all pixels have the samples of their tile, but where some were kept out
+        let of_tile = weights(self.counts[tile].map(|n| n as f64));
+        move |pixel| match &self.halves[..] {
+            [a, b] if self.rejected == 0 => {
+                let [a, b] = [a.mean[pixel], b.mean[pixel]];
+                std::array::from_fn(|c| blend([a[c], b[c]], of_tile))
+            }
+            _ => self.pixel(tile, pixel),
+        }
     }
 
     /// Settles the exposure that the picture will have once it has converged. The halves tell noise from
@@ -519,7 +537,49 @@ impl Film {
             let pixel = exposure::of_halves([a, b].map(|(mean, spp)| (mean, spp as f64)))?;
             Some(NoisyPixel { deviation: pixel.deviation.filter(|_| halves), ..pixel })
         };
-        tone.settle_by(|| exposure::estimate(grid.size(), pixel))
+        let block = |corner: [isize; 2]| match self.block_of_halves(corner, &columns, &rows) {
+            Some(block) => block,
+            None => NoisyBlock::gather(corner, grid.size(), pixel),
+        };
+        tone.settle_by(|| exposure::estimate_by_blocks(grid.size(), block))
+    }
+
+    /// The pixels of a block, by its first; `columns` and `rows` add up to the tile of a pixel. `None` if it does not lie
+    /// within the picture, or not all its pixels have the samples of their tile, or halves are not kept.
+    fn block_of_halves(
+        &self,
+        [left, top]: [isize; 2],
+        columns: &[usize],
+        rows: &[usize],
+    ) -> Option<NoisyBlock> {
+        let (left, top) = (usize::try_from(left).ok()?, usize::try_from(top).ok()?);
+        let (right, bottom) = (left + exposure::BLOCK, top + exposure::BLOCK);
+        let [_, _] = &self.halves[..] else { return None };
+        if right > self.width() || bottom > self.height() || self.rejected > 0 {
+            return None;
+        }
+        let mut pixels = [[[0.0; 3]; exposure::PIXELS]; 2];
+        for (half, pixels) in self.halves.iter().zip(&mut pixels) {
+            // All of it before anything is done with it: reading waits for memory, row by row
+            for (row, y) in pixels.chunks_exact_mut(exposure::BLOCK).zip(top..) {
+                row.copy_from_slice(&half.mean[y * self.width() + left..][..exposure::BLOCK]);
+            }
+        }
+        let mut counts = [[0.0; exposure::PIXELS]; 2];
+        let (columns, rows) = (&columns[left..right], &rows[top..bottom]);
+        let alike = columns[0] == columns[exposure::BLOCK - 1] && rows[0] == rows[exposure::BLOCK - 1];
+        for (half, counts) in counts.iter_mut().enumerate() {
+            if alike {
+                counts.fill(self.counts[rows[0] + columns[0]][half] as f64);
+                continue;
+            }
+            for (counts, row) in counts.chunks_exact_mut(exposure::BLOCK).zip(rows) {
+                for (count, column) in counts.iter_mut().zip(columns) {
+                    *count = self.counts[row + column][half] as f64;
+                }
+            }
+        }
+        Some(exposure::block_of_halves(&pixels, &counts))
     }
 
     /// The picture so far: mean linear radiance, row-major.

@@ -23,6 +23,7 @@ use crate::evidence::TilePlanes;
 use crate::film::Film;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
+use multiversion::multiversion;
 use noisefloor_vision::Viewing;
 use rayon::prelude::*;
 #[cfg(feature = "files")]
@@ -64,6 +65,9 @@ impl MetOnce {
             return met;
         }
         let mut halves = [Rows::new(tile.width), Rows::new(tile.width)];
+        let of_tile = HalfSamples::new(film.half_counts(tile.index));
+        let mut found = vec![0.0; tile.width];
+        let [mut excess_a, mut excess_b] = [(); 2].map(|()| vec![0.0; tile.width]);
         let inside = |y: usize| y.min(grid.height() - 1);
         for (half, rows) in halves.iter_mut().enumerate() {
             rows.push(film, half, tile, tile.y.saturating_sub(1));
@@ -75,32 +79,25 @@ impl MetOnce {
                 rows.find_highest();
             }
             let [a, b] = &halves;
-            let own = a.here().iter().zip(b.here());
-            let around = a.highest.iter().zip(&b.highest);
-            for (x, ((a, b), (around_a, around_b))) in own.zip(around).enumerate() {
-                let excess = [a - around_b, b - around_a];
-                if excess[0].max(excess[1]) > 0.0 {
-                    let counts = film.pixel_counts(tile.index, y * grid.width() + tile.x + x);
-                    let by_sample = excess.into_iter().zip(counts).map(|(e, n)| e * n as f32);
-                    if by_sample.fold(0.0, f32::max) <= accident {
-                        met.add(excess, counts);
-                    }
-                }
+            excesses([a.here(), b.here()], [&a.highest, &b.highest], [&mut excess_a, &mut excess_b]);
+            if film.rejected() == 0 {
+                found_row([&excess_a, &excess_b], of_tile, accident, &mut found);
+                found.iter().for_each(|&light| met.add(light, of_tile));
+                continue;
+            }
+            for (x, (&a, &b)) in excess_a.iter().zip(&excess_b).enumerate() {
+                let pixel = y * grid.width() + tile.x + x;
+                let samples = HalfSamples::new(film.pixel_counts(tile.index, pixel));
+                met.add(light_found([a, b], samples, accident), samples);
             }
         }
         met
     }
 
-    fn add(&mut self, excess: [f32; 2], counts: [u64; 2]) {
-        if counts.contains(&0) {
-            return;
-        }
-        let samples = (counts[0] + counts[1]) as f64;
-        // Of a half, the mean of all samples has its share
-        let light: f64 =
-            excess.into_iter().zip(counts).map(|(e, n)| f64::from(e.max(0.0)) * (n as f64 / samples)).sum();
+    #[inline]
+    fn add(&mut self, light: f64, samples: HalfSamples) {
         self.light += light;
-        self.by_sample += light * light * samples;
+        self.by_sample += light * light * samples.all;
     }
 
     fn and(self, other: Self) -> Self {
@@ -134,6 +131,22 @@ impl MetOnce {
     }
 }
 
+/// Samples of the halves at a pixel.
+#[derive(Clone, Copy)]
+struct HalfSamples {
+    counts: [f32; 2],
+    /// Of all samples.
+    shares: [f64; 2],
+    all: f64,
+}
+
+impl HalfSamples {
+    fn new([a, b]: [u64; 2]) -> Self {
+        let all = (a + b) as f64;
+        Self { counts: [a as f32, b as f32], shares: [a as f64 / all, b as f64 / all], all }
+    }
+}
+
 /// Three rows of a half, each with a pixel more to both sides; the picture's edge repeats.
 struct Rows {
     rows: [Vec<f32>; 3],
@@ -153,29 +166,82 @@ impl Rows {
         self.rows.rotate_left(1);
         let [.., last] = &mut self.rows;
         let Some(row) = film.half_row(half, y) else { return };
-        let light = |pixel: Rgb| luminance(pixel).max(0.0);
         let (left, right) = (tile.x.saturating_sub(1), (tile.x + tile.width).min(film.grid().width() - 1));
         let [first, inner @ .., end] = &mut last[..] else { return };
-        for (value, &pixel) in inner.iter_mut().zip(&row[tile.x..]) {
-            *value = light(pixel);
-        }
+        light_row(&row[tile.x..][..inner.len()], inner);
         (*first, *end) = (light(row[left]), light(row[right]));
     }
 
     fn find_highest(&mut self) {
-        let [above, here, below] = &self.rows;
-        for (((highest, above), here), below) in self.columns.iter_mut().zip(above).zip(here).zip(below) {
-            *highest = above.max(*here).max(*below);
-        }
-        for (highest, three) in self.highest.iter_mut().zip(self.columns.windows(3)) {
-            *highest = three[0].max(three[1]).max(three[2]);
-        }
+        highest_of_nine(self.rows.each_ref().map(Vec::as_slice), &mut self.columns, &mut self.highest);
     }
 
     /// The row in the middle, without the pixels beside the tile.
     fn here(&self) -> &[f32] {
         let row = &self.rows[1];
         &row[1..row.len() - 1]
+    }
+}
+
+fn light(pixel: Rgb) -> f32 {
+    luminance(pixel).max(0.0)
+}
+
+/// Luminances of pixels.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn light_row(pixels: &[Rgb], out: &mut [f32]) {
+    for (out, &pixel) in out.iter_mut().zip(pixels) {
+        let light = luminance(pixel);
+        *out = if light > 0.0 { light } else { 0.0 };
+    }
+}
+
+/// The largest of each column, and of nine around each pixel but the first and the last. None is NaN.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn highest_of_nine([above, here, below]: [&[f32]; 3], columns: &mut [f32], highest: &mut [f32]) {
+    let n = highest.len();
+    let (above, here, below, columns) =
+        (&above[..n + 2], &here[..n + 2], &below[..n + 2], &mut columns[..n + 2]);
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    for x in 0..n + 2 {
+        columns[x] = larger(larger(above[x], here[x]), below[x]);
+    }
+    for x in 0..n {
+        highest[x] = larger(larger(columns[x], columns[x + 1]), columns[x + 2]);
+    }
+}
+
+/// What each half has more at a pixel than the other around it.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn excesses([a, b]: [&[f32]; 2], [around_a, around_b]: [&[f32]; 2], [of_a, of_b]: [&mut [f32]; 2]) {
+    let n = of_a.len();
+    let (a, b, around_a, around_b, of_b) = (&a[..n], &b[..n], &around_a[..n], &around_b[..n], &mut of_b[..n]);
+    for x in 0..n {
+        of_a[x] = a[x] - around_b[x];
+        of_b[x] = b[x] - around_a[x];
+    }
+}
+
+/// Light in the mean of all samples of a pixel, by what each half has more than the other around it; none if one sample of
+/// it is an accident.
+#[inline(always)]
+fn light_found([a, b]: [f32; 2], samples: HalfSamples, accident: f32) -> f64 {
+    let HalfSamples { counts, shares, .. } = samples;
+    let [a, b] = [if a > 0.0 { a } else { 0.0 }, if b > 0.0 { b } else { 0.0 }];
+    let is_accident = a * counts[0] > accident || b * counts[1] > accident;
+    let is_light = !is_accident && counts[0] > 0.0 && counts[1] > 0.0;
+    // Of a half, the mean of all samples has its share
+    let light = f64::from(a) * shares[0] + f64::from(b) * shares[1];
+    if is_light { light } else { 0.0 }
+}
+
+/// [`light_found`] at the pixels of a row.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn found_row([a, b]: [&[f32]; 2], samples: HalfSamples, accident: f32, found: &mut [f64]) {
+    let n = found.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for x in 0..n {
+        found[x] = light_found([a[x], b[x]], samples, accident);
     }
 }
 

@@ -36,11 +36,14 @@ pub(super) fn block_sums(map: DifferenceBand<'_>, place: Tile) -> Vec<[f32; 2]> 
         let row = rows[(y / map.step).min(rows.len() - 1)];
         let of_row = ((place.y + y) / BLOCK - place.y / BLOCK) * columns.len();
         let sums = &mut sums[of_row..of_row + columns.len()];
-        for x in 0..place.width {
-            let value = row[(x / map.step).min(row.len() - 1)];
-            let [sum, squares] = &mut sums[(place.x + x) / BLOCK - columns.start];
-            *sum += value;
-            *squares += value * value;
+        for ([sum, squares], column) in sums.iter_mut().zip(columns.clone()) {
+            let from = (column * BLOCK).max(place.x) - place.x;
+            let to = ((column + 1) * BLOCK - place.x).min(place.width);
+            for x in from..to {
+                let value = row[if map.step == 1 { x } else { (x / map.step).min(row.len() - 1) }];
+                *sum += value;
+                *squares += value * value;
+            }
         }
     }
     sums
@@ -171,7 +174,7 @@ impl PictureContrast {
         };
         let (rows, columns) = (&self.rows, &self.columns);
         let zones = divide(rows).flat_map(|rows| divide(columns).map(move |columns| (rows.clone(), columns)));
-        zones.map(zone).collect()
+        zones.collect::<Vec<_>>().into_par_iter().map(zone).collect()
     }
 
     /// The mean over a window of `edge` blocks around a block; at the edge of the picture, over the nearest window

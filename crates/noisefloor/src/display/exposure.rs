@@ -10,7 +10,11 @@
 
 use super::{DELTA, luminance};
 use crate::rgb::Rgb;
+use multiversion::multiversion;
 use rayon::prelude::*;
+
+mod block;
+pub(crate) use block::{NoisyBlock, PIXELS};
 
 /// Squared ratio of a mean to its standard error from which it is known. With a larger one, blocks are
 /// larger, and what the picture changes by within them counts as too bright; with a smaller one, pixels
@@ -18,7 +22,7 @@ use rayon::prelude::*;
 /// (docs/benchmarks/exposure.md).
 const ENOUGH: f64 = 8.0;
 /// Edge of the blocks that are pooled first, pixel by pixel.
-const BLOCK: usize = 8;
+pub(crate) const BLOCK: usize = 8;
 /// Edge of the blocks that tell of the noise of a pixel. One difference of two halves says little by
 /// itself: halves that met the same light once differ by nothing.
 const AROUND: usize = 4;
@@ -80,6 +84,7 @@ struct Pool {
 }
 
 /// (mean/standard error)² of a sum.
+#[inline(always)]
 fn certainty(sum: f64, variance: f64) -> f64 {
     if variance > 0.0 { sum * sum / variance } else { f64::INFINITY }
 }
@@ -161,24 +166,6 @@ struct Noise {
     relative: f64,
 }
 
-impl Noise {
-    /// Of luminances and their variances.
-    fn of(pixels: impl Iterator<Item = [f64; 2]>) -> Self {
-        let (mut light, mut variance, mut relative, mut lit) = (0.0, 0.0, 0.0, 0.0);
-        for [luminance, noise] in pixels {
-            light += luminance;
-            variance += noise;
-            if luminance == 0.0 {
-                continue;
-            }
-            relative += (noise / (luminance * luminance)).min(1.0);
-            lit += 1.0;
-        }
-        let of_light = if light > 0.0 { variance / light } else { 0.0 };
-        Self { of_light, relative: if lit > 0.0 { relative / lit } else { 0.0 } }
-    }
-}
-
 /// Bins of a logarithm: all that an f32 can have, and sums of many.
 const BINS: i32 = 256;
 
@@ -199,13 +186,34 @@ impl Tally {
     }
 
     fn add(&mut self, pixels: f64, log: f64, relative: f64) {
-        // The floor, without the call that `floor` is
-        let whole = log as i32;
-        let bin = (whole - i32::from(f64::from(whole) > log) + BINS / 2).clamp(0, BINS - 1);
-        let [count, sum] = &mut self.bins[bin as usize];
+        let [count, sum] = &mut self.bins[Self::bin(log)];
         *count += pixels;
         *sum += pixels * log;
         self.variance += pixels * pixels * relative;
+    }
+
+    /// The same of single pixels, those that are known.
+    fn add_pixels(&mut self, known: &[bool; PIXELS], logs: &[f64; PIXELS], relative: &[f64; PIXELS]) {
+        // Neighbours are mostly of one bin, which need not be written each time
+        let (mut bin, mut variance) = (0, self.variance);
+        let mut here = self.bins[bin];
+        for ((&log, relative), _) in logs.iter().zip(relative).zip(known).filter(|(_, known)| **known) {
+            let next = Self::bin(log);
+            if next != bin {
+                self.bins[bin] = here;
+                (bin, here) = (next, self.bins[next]);
+            }
+            here = [here[0] + 1.0, here[1] + log];
+            variance += relative;
+        }
+        self.bins[bin] = here;
+        self.variance = variance;
+    }
+
+    fn bin(log: f64) -> usize {
+        // The floor, without the call that `floor` is
+        let whole = log as i32;
+        (whole - i32::from(f64::from(whole) > log) + BINS / 2).clamp(0, BINS - 1) as usize
     }
 
     fn merge(&mut self, other: &Self) {
@@ -237,10 +245,17 @@ pub(crate) fn estimate(
     size: (usize, usize),
     pixel: impl Fn(usize, usize) -> Option<NoisyPixel> + Sync,
 ) -> Option<LogAverage> {
-    let pixel = |x: usize, y: usize| pixel(x, y).filter(|p| p.luminance.is_finite());
+    estimate_by_blocks(size, |corner| NoisyBlock::gather(corner, size, &pixel))
+}
+
+/// The same, of a picture that gives the blocks that begin at pixels, which may lie before its first.
+pub(crate) fn estimate_by_blocks(
+    size: (usize, usize),
+    block: impl Fn([isize; 2]) -> NoisyBlock + Sync,
+) -> Option<LogAverage> {
     let mut most = LOOKED_AT;
     loop {
-        match by_blocks(size, most, &pixel) {
+        match by_blocks(size, most, &block) {
             Some((found, sampled)) if sampled <= SAMPLED => return Some(found),
             None if Lattice::is_whole(size, most) => return None,
             _ => most *= 4,
@@ -252,11 +267,11 @@ pub(crate) fn estimate(
 fn by_blocks(
     size: (usize, usize),
     most: usize,
-    pixel: &(impl Fn(usize, usize) -> Option<NoisyPixel> + Sync),
+    block: &(impl Fn([isize; 2]) -> NoisyBlock + Sync),
 ) -> Option<(LogAverage, f64)> {
     let grids: Vec<[Option<LogAverage>; 2]> = (0..GRIDS.len())
         .into_par_iter()
-        .map(|grid| on_grid(&Lattice::new(size, grid, most), pixel))
+        .map(|grid| on_grid(&Lattice::new(size, grid, most), block))
         .collect();
     let [found, coarse] = [0, 1].map(|i| grids.iter().filter_map(|of| of[i]).collect::<Vec<LogAverage>>());
     let mean = mean_log(&found)?;
@@ -339,32 +354,11 @@ fn scattered(number: usize) -> u64 {
 }
 
 /// The same by the blocks of one grid: with [`ENOUGH`], and with twice as much.
-fn on_grid(
-    lattice: &Lattice,
-    pixel: &(impl Fn(usize, usize) -> Option<NoisyPixel> + Sync),
-) -> [Option<LogAverage>; 2] {
-    let (width, height) = lattice.size;
+fn on_grid(lattice: &Lattice, block: &(impl Fn([isize; 2]) -> NoisyBlock + Sync)) -> [Option<LogAverage>; 2] {
     let row_of_cells = |row: usize| {
         let mut tallies = [ENOUGH, 2.0 * ENOUGH].map(Tally::new);
-        let block = |column: usize| {
-            let [left, top] = lattice.block(column, row);
-            let mut pixels = [[None; BLOCK]; BLOCK];
-            for (y, row) in pixels.iter_mut().enumerate() {
-                let Some(y) = top.checked_add_unsigned(y).and_then(|y| usize::try_from(y).ok()) else {
-                    continue;
-                };
-                for (x, place) in row.iter_mut().enumerate() {
-                    let Some(x) = left.checked_add_unsigned(x).and_then(|x| usize::try_from(x).ok()) else {
-                        continue;
-                    };
-                    if x < width && y < height {
-                        *place = pixel(x, y);
-                    }
-                }
-            }
-            pool_block(&pixels, &mut tallies)
-        };
-        let pools: Vec<[Pool; 2]> = (0..lattice.cells.0).map(block).collect();
+        let pool = |column: usize| block(lattice.block(column, row)).pool(&mut tallies);
+        let pools: Vec<[Pool; 2]> = (0..lattice.cells.0).map(pool).collect();
         (pools, tallies)
     };
     let parts: Vec<_> = (0..lattice.cells.1).into_par_iter().map(row_of_cells).collect();
@@ -412,68 +406,6 @@ fn halved(pools: &[Pool], (columns, rows): (usize, usize), tally: &mut Tally) ->
     larger
 }
 
-type Block<T> = [[Option<T>; BLOCK]; BLOCK];
-
-/// Counts what is known of a block pixel by pixel, and in blocks of 2×2, 4×4 and 8×8, for either tally.
-fn pool_block(pixels: &Block<NoisyPixel>, tallies: &mut [Tally; 2]) -> [Pool; 2] {
-    let pixels = &with_variances(pixels);
-    let around = |x: usize, y: usize| {
-        let rows = pixels[y..y + AROUND].iter();
-        Noise::of(rows.flat_map(|row| row[x..x + AROUND].iter().copied().flatten()))
-    };
-    let noise = [0, AROUND].map(|y| [0, AROUND].map(|x| around(x, y)));
-    tallies.each_mut().map(|tally| {
-        let mut pools = [Pool::default(); BLOCK * BLOCK];
-        for (at, pool) in pools.iter_mut().enumerate() {
-            let (x, y) = (at % BLOCK, at / BLOCK);
-            let noise = noise[y / AROUND][x / AROUND];
-            if let Some(pixel) = pixels[y][x] {
-                *pool = Pool::pixel(pixel, noise);
-                pool.count(noise, tally);
-            }
-        }
-        let mut edge = BLOCK;
-        while edge > 1 {
-            let half = edge / 2;
-            for at in 0..half * half {
-                let (x, y) = (at % half * 2, at / half * 2);
-                // Never before what is still to be read
-                let first = y * edge + x;
-                let four = [first, first + 1, first + edge, first + edge + 1];
-                pools[at] = Pool::of(four.iter().map(|&at| &pools[at]), 1);
-                // From 4×4 on, a block has differences enough of its own
-                let noise = if half == AROUND { noise[y / AROUND][x / AROUND] } else { Noise::default() };
-                pools[at].count(noise, tally);
-            }
-            edge = half;
-        }
-        pools[0]
-    })
-}
-
-/// Luminance and its variance. Where that is not given, it is the sample variance of 2×2 pixels: where
-/// the picture changes as much as it does from pixel to pixel, it counts as noise, and is known in larger
-/// blocks only.
-fn with_variances(pixels: &Block<NoisyPixel>) -> Block<[f64; 2]> {
-    let beside = |x: usize, y: usize| {
-        let (x, y) = (x & !1, y & !1);
-        let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| pixels[y][x]);
-        let there = || four.iter().flatten().map(|pixel| f64::from(pixel.luminance));
-        let count = there().count() as f64;
-        let mean = there().sum::<f64>() / count;
-        there().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)
-    };
-    let mut all = [[None; BLOCK]; BLOCK];
-    for (y, (row, pixels)) in all.iter_mut().zip(pixels).enumerate() {
-        for (x, (place, pixel)) in row.iter_mut().zip(pixels).enumerate() {
-            let Some(NoisyPixel { luminance, deviation }) = *pixel else { continue };
-            let variance = deviation.map_or_else(|| beside(x, y), |deviation| f64::from(deviation).powi(2));
-            *place = Some([f64::from(luminance), variance]);
-        }
-    }
-    all
-}
-
 /// Two renderings of one picture, of so many samples per pixel each, at one pixel: their mean and its
 /// standard deviation.
 pub(crate) fn of_halves([(a, na), (b, nb)]: [(Rgb, f64); 2]) -> Option<NoisyPixel> {
@@ -481,12 +413,34 @@ pub(crate) fn of_halves([(a, na), (b, nb)]: [(Rgb, f64); 2]) -> Option<NoisyPixe
     if all.is_nan() || all <= 0.0 {
         return None;
     }
-    let [a, b] = [a, b].map(|half| f64::from(luminance(half)));
+    let [luminance, deviation] = of_luminances([a, b].map(|half| f64::from(luminance(half))), [na, nb]);
+    Some(NoisyPixel { luminance, deviation: Some(deviation) })
+}
+
+/// The same of a whole block, of two renderings of so many samples per pixel.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn block_of_halves([a, b]: &[[Rgb; PIXELS]; 2], counts: &[[f64; PIXELS]; 2]) -> NoisyBlock {
+    let nothing = [0.0; PIXELS];
+    let mut block = NoisyBlock { luminance: nothing, deviation: nothing, there: [false; PIXELS] };
+    for at in 0..PIXELS {
+        let light = [f64::from(luminance(a[at])), f64::from(luminance(b[at]))];
+        let counts = [counts[0][at], counts[1][at]];
+        [block.luminance[at], block.deviation[at]] = of_luminances(light, counts);
+        block.there[at] = counts[0] + counts[1] > 0.0 && block.luminance[at].is_finite();
+    }
+    block
+}
+
+/// Mean and standard deviation of two luminances, by so many samples.
+#[inline(always)]
+fn of_luminances([a, b]: [f64; 2], [na, nb]: [f64; 2]) -> [f32; 2] {
+    let all = na + nb;
     let mean = (na * a + nb * b) / all;
     // A − B has σ²·(n_A + n_B)/(n_A·n_B), the mean of all σ²/(n_A + n_B). One half alone says nothing of
     // its noise.
-    let deviation = if na > 0.0 && nb > 0.0 { (a - b).abs() * (na * nb).sqrt() / all } else { mean };
-    Some(NoisyPixel { luminance: mean as f32, deviation: Some(deviation as f32) })
+    let both = (a - b).abs() * (na * nb).sqrt() / all;
+    let deviation = if na > 0.0 && nb > 0.0 { both } else { mean };
+    [mean as f32, deviation as f32]
 }
 
 #[cfg(test)]

@@ -164,12 +164,11 @@ struct Sides(Vec<[[Vec<f64>; 2]; 4]>);
 impl Sides {
     fn of(film: &Film) -> Self {
         let width = film.grid().width();
-        let light = |tile: Tile, x: usize, y: usize| {
-            f64::from(luminance(film.pixel(tile.index, (tile.y + y) * width + tile.x + x)))
-        };
         let sides = |tile: Tile| {
-            let row = |y: usize| (0..tile.width).map(|x| light(tile, x, y)).collect();
-            let column = |x: usize| (0..tile.height).map(|y| light(tile, x, y)).collect();
+            let picture = film.pixels_of(tile.index);
+            let light = |x: usize, y: usize| f64::from(luminance(picture((tile.y + y) * width + tile.x + x)));
+            let row = |y: usize| (0..tile.width).map(|x| light(x, y)).collect();
+            let column = |x: usize| (0..tile.height).map(|y| light(x, y)).collect();
             let (right, bottom) = (tile.width - 1, tile.height - 1);
             [
                 [row(0), row(bottom.min(1))],
