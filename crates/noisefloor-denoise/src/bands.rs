@@ -1,5 +1,8 @@
 //! Planes split by scale, and local means.
 
+use rayon::prelude::*;
+use std::ops::Range;
+
 /// A plane of values, row-major, with its width and height.
 #[derive(Clone, Debug)]
 pub(crate) struct Plane {
@@ -22,7 +25,7 @@ impl Plane {
         let step = 1usize << level;
         let across = self.smooth(step, true);
         let rest = across.smooth(step, false);
-        let fine = self.values.iter().zip(&rest.values).map(|(whole, rest)| whole - rest).collect();
+        let fine = self.values.par_iter().zip(&rest.values).map(|(whole, rest)| whole - rest).collect();
         let size = self.size;
         *self = rest;
         Plane { size, values: fine }
@@ -32,7 +35,7 @@ impl Plane {
     fn smooth(&self, step: usize, along_rows: bool) -> Plane {
         let (width, height) = self.size;
         let mut out = vec![0.0; self.values.len()];
-        for (y, row) in out.chunks_exact_mut(width).enumerate() {
+        out.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
             for (distance, weight) in SPLINE.iter().enumerate() {
                 let signs: &[isize] = if distance == 0 { &[1] } else { &[1, -1] };
                 for sign in signs {
@@ -49,16 +52,17 @@ impl Plane {
                     }
                 }
             }
-        }
+        });
         Plane { size: self.size, values: out }
     }
 
     /// The mean over a square of `2·radius + 1` pixels around each pixel, of what of it lies in the picture.
     pub(crate) fn local_mean(&self, radius: usize) -> Plane {
-        let (width, height) = self.size;
+        let width = self.size.0;
         // Sums over rows, then over columns of these
         let mut across = vec![0.0f64; self.values.len()];
-        for (row, out) in self.values.chunks_exact(width).zip(across.chunks_exact_mut(width)) {
+        let rows = self.values.par_chunks_exact(width).zip(across.par_chunks_exact_mut(width));
+        rows.for_each(|(row, out)| {
             let mut sum: f64 = row[..radius.min(width)].iter().map(|&v| f64::from(v)).sum();
             for (x, out) in out.iter_mut().enumerate() {
                 if let Some(&entering) = row.get(x + radius) {
@@ -69,26 +73,51 @@ impl Plane {
                 }
                 *out = sum / window(x, radius, width);
             }
-        }
-        let mut sums = vec![0.0f64; width];
-        for row in across.chunks_exact(width).take(radius.min(height)) {
-            sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += v);
-        }
+        });
+        // Columns are added up by themselves, a strip of them for each thread
+        let strips: Vec<Vec<f32>> = (0..width)
+            .step_by(STRIP)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|from| means_down(&across, self.size, radius, from..(from + STRIP).min(width)))
+            .collect();
         let mut values = vec![0.0; self.values.len()];
-        for (y, out) in values.chunks_exact_mut(width).enumerate() {
-            if y + radius < height {
-                let row = &across[(y + radius) * width..][..width];
-                sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += v);
+        values.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+            for (row, strip) in row.chunks_mut(STRIP).zip(&strips) {
+                row.copy_from_slice(&strip[y * row.len()..][..row.len()]);
             }
-            if y > radius {
-                let row = &across[(y - radius - 1) * width..][..width];
-                sums.iter_mut().zip(row).for_each(|(sum, v)| *sum -= v);
-            }
-            let rows = window(y, radius, height);
-            out.iter_mut().zip(&sums).for_each(|(out, sum)| *out = (sum / rows) as f32);
-        }
+        });
         Plane { size: self.size, values }
     }
+}
+
+/// Columns that one thread adds up.
+const STRIP: usize = 128;
+
+/// Means along some columns, over `2·radius + 1` rows around each.
+fn means_down(
+    across: &[f64],
+    (width, height): (usize, usize),
+    radius: usize,
+    columns: Range<usize>,
+) -> Vec<f32> {
+    let row = |y: usize| &across[y * width..][columns.clone()];
+    let mut sums = vec![0.0f64; columns.len()];
+    for y in 0..radius.min(height) {
+        sums.iter_mut().zip(row(y)).for_each(|(sum, v)| *sum += v);
+    }
+    let mut means = Vec::with_capacity(columns.len() * height);
+    for y in 0..height {
+        if y + radius < height {
+            sums.iter_mut().zip(row(y + radius)).for_each(|(sum, v)| *sum += v);
+        }
+        if y > radius {
+            sums.iter_mut().zip(row(y - radius - 1)).for_each(|(sum, v)| *sum -= v);
+        }
+        let rows = window(y, radius, height);
+        means.extend(sums.iter().map(|sum| (sum / rows) as f32));
+    }
+    means
 }
 
 /// How many of the places around `at` exist.

@@ -77,13 +77,12 @@ pub struct DenoisedError {
 
 /// How far a denoised picture is from what it may have lost.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DenoisedExcess {
     /// In its worst square.
     pub worst: Excess,
     /// In each of its [`squares`]: what may be lost there, with the margin, over what is allowed.
     pub squares: Vec<(Tile, f64)>,
-    /// JODs lost around each pixel, row-major.
-    pub map: Vec<f32>,
 }
 
 /// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves, what a white
@@ -108,14 +107,14 @@ impl DenoisedError {
             .into_par_iter()
             .map(|i| displayed(display, noisy.map(|p| p[i]), denoised.map(|p| p[i])))
             .collect();
-        let plane = |n: usize| Plane::new(size, all.iter().map(|pixel| pixel[n]).collect());
+        let plane = |n: usize| Plane::new(size, all.par_iter().map(|pixel| pixel[n]).collect());
         let mut residual = plane(1).values;
         settle_sign(&mut residual);
         // Nothing is added to what is white already: the picture is shown without it
         let without = |(pixel, &residual): (&Displayed, &f32)| {
             if residual > 0.0 { pixel[0] - pixel[2] } else { pixel[0] }
         };
-        let shown = all.iter().zip(&residual).map(without).collect();
+        let shown = all.par_iter().zip(&residual).map(without).collect();
         let mut standing = vec![0.0; all.len()];
         let residuals = [plane(3), plane(4)];
         add_common([&mut residual, &mut standing], residuals.clone());
@@ -127,7 +126,7 @@ impl DenoisedError {
             *standing += lacking;
         }
         let light = |i: usize| Light::new(noisy.map(|p| p[i]), denoised.map(|p| p[i]));
-        let light = (0..noisy[0].len()).map(light).collect();
+        let light = (0..noisy[0].len()).into_par_iter().map(light).collect();
         Ok(Self { size, shown, residual, standing, light, display: display.clone() })
     }
 
@@ -150,6 +149,12 @@ impl DenoisedError {
         let residual = picture.iter().zip(&shown).map(|(&p, truth)| display.luma(p) - truth).collect();
         let light = picture.iter().zip(truth).map(|(&p, &t)| Light::new([t; 2], [p; 2])).collect();
         Ok(Self { size, shown, residual, standing: Vec::new(), light, display: display.clone() })
+    }
+
+    /// The same with a brightness that is not in question: all that [`DenoisedError::map_of_jods_lost`] needs.
+    #[must_use]
+    pub fn of_shape_alone(self) -> Self {
+        Self { light: Vec::new(), ..self }
     }
 
     /// Width and height in pixels.
@@ -211,7 +216,7 @@ impl DenoisedError {
             (*ratio, Some((square.x + square.width / 2, square.y + square.height / 2)))
         });
         let worst = Excess::new(ratio).at(place);
-        Ok(DenoisedExcess { worst, squares, map: self.map_of_jods_lost(&eyes)? })
+        Ok(DenoisedExcess { worst, squares })
     }
 
     /// The same of the whole, if the residual had `contrast` times its strength.
@@ -361,21 +366,21 @@ fn add_common([sum, other]: [&mut [f32]; 2], mut residuals: [Plane; 2]) {
         let part =
             |residual: &mut Plane| if scale < SCALES { residual.split(scale) } else { residual.clone() };
         let (a, b) = rayon::join(|| part(ra), || part(rb));
-        let pairs = || a.values.iter().zip(&b.values);
+        let pairs = || a.values.par_iter().zip(&b.values);
         let mean_of = |of: fn(f32, f32) -> f32| {
             Plane::new(a.size, pairs().map(|(&a, &b)| of(a, b)).collect()).local_mean(RADIUS)
         };
         let (product, energy) =
             rayon::join(|| mean_of(|a, b| a * b), || mean_of(|a, b| 0.25 * (a + b) * (a + b)));
-        let local = product.values.iter().zip(&energy.values);
-        let sums = sum.iter_mut().zip(other.iter_mut());
-        for (((sum, other), (a, b)), (&common, &energy)) in sums.zip(pairs()).zip(local) {
+        let local = product.values.par_iter().zip(&energy.values);
+        let sums = sum.par_iter_mut().zip(other.par_iter_mut());
+        sums.zip(pairs()).zip(local).for_each(|(((sum, other), (a, b)), (&common, &energy))| {
             // Chance makes the mean product negative, too: nothing in common then. The estimate is that much too
             // large on average where there is no bias; what it misses elsewhere makes up for it
             let share = if energy > 0.0 { (common / energy).clamp(0.0, 1.0).sqrt() } else { 0.0 };
             let common = share * 0.5 * (a + b);
             *sum += common;
             *other += common;
-        }
+        });
     }
 }

@@ -9,8 +9,9 @@ use noisefloor::stills::StillWarning;
 use noisefloor::tune::{
     Ending, Excess, Knob, Look, Next, PairError, PicturePair, Search, Tuning, crops_for, most_in_squares,
 };
-use noisefloor::{Oracle, Params, Rgb, Tile};
+use noisefloor::{Oracle, Params, Rgb, Tile, Viewing};
 use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedExcess, DenoisedHalves};
+use noisefloor_vision::VisionModel;
 use numpy::PyArray2;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -25,9 +26,16 @@ const TILE: usize = 64;
 pub(crate) struct PyExcess {
     excess: Excess,
     size: (usize, usize),
-    map: Vec<f32>,
+    left: Left,
     /// Squares, and what is wrong in each over what may be.
     squares: Vec<(Tile, f64)>,
+}
+
+/// What is left, pixel by pixel.
+enum Left {
+    Map(Vec<f32>),
+    /// Denoised pictures, of which a map takes as long as the verdict, and is made when it is asked for.
+    Denoised(Box<DenoisedError>, Viewing),
 }
 
 #[pymethods]
@@ -49,7 +57,13 @@ impl PyExcess {
     /// What is left, an array of shape (height, width): visible noise, of which 1 is the limit; or of denoised pictures
     /// the JODs lost.
     fn map<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        plane(py, self.size, self.map.clone())
+        let map = match &self.left {
+            Left::Map(map) => map.clone(),
+            Left::Denoised(error, viewing) => py
+                .detach(|| error.map_of_jods_lost(&VisionModel::new(viewing)))
+                .map_err(|error| PictureError::new_err(error.to_string()))?,
+        };
+        plane(py, self.size, map)
     }
 
     /// squares() --
@@ -396,14 +410,15 @@ fn compare(
     let Some([da, db]) = denoised else {
         let (excess, map) = pair.noise(oracle, params).map_err(unfit)?;
         let squares = most_in_squares(size, &map);
-        return Ok((PyExcess { excess, size, map, squares }, warnings));
+        return Ok((PyExcess { excess, size, left: Left::Map(map), squares }, warnings));
     };
     let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());
     let compared = pair.compare(params);
     let halves = DenoisedHalves { size, noisy: [&pictures[0], &pictures[1]], denoised: [&da, &db] };
     let error = DenoisedError::new(&halves, compared.display()).map_err(|error| failed(&error))?;
     let found = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;
-    let DenoisedExcess { worst, squares, map } = found;
+    let DenoisedExcess { worst, squares, .. } = found;
     let excess = pair.tell_apart(worst);
-    Ok((PyExcess { excess, size, map, squares }, warnings))
+    let left = Left::Denoised(Box::new(error.of_shape_alone()), params.viewing);
+    Ok((PyExcess { excess, size, left, squares }, warnings))
 }

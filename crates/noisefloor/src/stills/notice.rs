@@ -116,10 +116,13 @@ fn warnings(image: &Still, other: &Still, display: &Display) -> Vec<StillWarning
 fn correlation_of_neighbours(image: &Still, other: &Still, display: &Display) -> Option<f64> {
     let light = |still: &Still, pixel: usize| f64::from(luminance(display.encode(still.pixels[pixel])));
     const PAIRS: usize = 2 * (BLOCK - 1) * (BLOCK - 1);
+    // Displays take most of the time, and blocks need not wait for each other there
+    let of_block = |block: Vec<usize>| -> Vec<f64> {
+        block.iter().map(|&pixel| light(image, pixel) - light(other, pixel)).collect()
+    };
+    let all: Vec<Vec<f64>> = blocks(image.size).collect::<Vec<_>>().into_par_iter().map(of_block).collect();
     let (mut sum, mut squares, mut energy) = (0.0, 0.0, 0.0);
-    for block in blocks(image.size) {
-        let differences: Vec<f64> =
-            block.iter().map(|&pixel| light(image, pixel) - light(other, pixel)).collect();
+    for differences in all {
         let mean = differences.iter().sum::<f64>() / differences.len() as f64;
         let at = |x: usize, y: usize| differences[y * BLOCK + x] - mean;
         for (x, y) in (0..BLOCK - 1).flat_map(|y| (0..BLOCK - 1).map(move |x| (x, y))) {

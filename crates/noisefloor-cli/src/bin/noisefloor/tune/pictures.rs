@@ -16,6 +16,7 @@ use noisefloor_denoise::{
     DenoisedError, DenoisedExcess, DenoisedHalves, Denoiser, Guides, NoisyPicture, Oidn,
 };
 use noisefloor_sidecar::ThresholdCommand;
+use noisefloor_vision::VisionModel;
 use std::fs::File;
 use std::mem::discriminant;
 use std::time::Duration;
@@ -372,7 +373,8 @@ impl<'a> Judges<'a> {
                 let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;
                 let error =
                     DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
-                let DenoisedExcess { worst, squares, map } = error.excess(*lost, &params.viewing)?;
+                let DenoisedExcess { worst, squares, .. } = error.excess(*lost, &params.viewing)?;
+                let map = error.map_of_jods_lost(&VisionModel::new(&params.viewing))?;
                 let excess = in_whole(halves.tell_apart(worst));
                 let denoised = Some(denoiser.denoise(&guided(&mean, 2))?);
                 Ok(Judged { excess, size, mean, denoised, display, map, squares, spp })
