@@ -30,6 +30,14 @@ const DECAY: f64 = 0.5;
 const DENOISED_DECAY: f64 = 0.38;
 /// Light that few samples have met is spread over ever more finds.
 const UNMET_DECAY: f64 = 1.0;
+/// A tile that needs n samples takes n^TOGETHER · N^(1 − TOGETHER), where the hardest so far needs N, if these are so many
+/// times more than it has (`docs/benchmarks/where.md`).
+const TOGETHER: f64 = 0.72;
+const TOGETHER_STEP: f64 = 1.2;
+/// From so many tiles on, counts that are drawn together make up for most of what estimates err by, and this is left of the
+/// margin: [`stops_err_by`].
+const COMPANY: usize = 16;
+const ERR_BY_IN_COMPANY: f64 = 1.1;
 /// JODs that a tile may lose, unless one says otherwise. Where people stopped seeing *noise*, zones had lost as much,
 /// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/criteria.md`).
 pub const DEFAULT_JODS_LOST: f64 = 0.3;
@@ -49,6 +57,9 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 ///
 /// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
 /// they are given. [`Verdict::undenoised`] says so, and [`compose`](crate::compose) shows such tiles as they were rendered.
+///
+/// Counts are drawn together: a tile that is satisfied goes on being sampled, a little, and is judged again, while others need
+/// far more. For the same promise, this takes about as many samples, and leaves less in the mean (`docs/benchmarks/where.md`).
 ///
 /// A tile stays open as long as it is likely to lack light that few samples have met ([`Verdict::unmet`]), and that would by itself
 /// lose more than the limit where it fell on a plain field as bright as the tile: a denoiser takes lone finds for noise, and removes
@@ -75,7 +86,7 @@ pub struct DenoisedQuality<D> {
 
 impl<D: Denoiser> DenoisedQuality<D> {
     /// Tiles may lose at most so many JODs, a positive number: 19 of 20 that stop have lost no more, as their estimates
-    /// are held to it with a margin, [`ESTIMATE_ERRS_BY`].
+    /// are held to it with a margin, [`stops_err_by`].
     pub fn new(denoiser: D, lost: f64) -> Self {
         let (guides, passes) = (None, DenoisePasses::One);
         Self { denoiser, lost, guides, passes, record: Arc::default(), done: Vec::new(), revised: Vec::new() }
@@ -129,6 +140,24 @@ impl<D: Denoiser> DenoisedQuality<D> {
         errors.collect()
     }
 
+    /// Samples per pixel that each satisfied tile is still to have, where others need more; `None` for whoever has enough.
+    fn together(&self, film: &Film) -> Vec<Option<u64>> {
+        let has = |tile: usize| film.spp(tile) as f64;
+        let needs: Vec<f64> = self
+            .done
+            .iter()
+            .enumerate()
+            .map(|(tile, done)| done.map_or(has(tile), |done| done.spp as f64))
+            .collect();
+        let wanted = drawn_together(&needs).into_iter().zip(&self.done).enumerate();
+        wanted
+            .map(|(tile, (wanted, done))| {
+                let more = done.is_some() && wanted >= TOGETHER_STEP * has(tile);
+                more.then_some(wanted as u64)
+            })
+            .collect()
+    }
+
     fn failed(&self, error: &DenoiseError) -> CriterionError {
         let (mut why, mut cause) = (error.to_string(), error.source());
         while let Some(error) = cause {
@@ -137,6 +166,21 @@ impl<D: Denoiser> DenoisedQuality<D> {
         }
         CriterionError::Failed { name: self.name(), why }
     }
+}
+
+/// Of tiles that stop by [`DenoisedQuality`], in a picture of so many, 19 of 20 have lost less than so many times as much as
+/// was estimated when they stopped (`docs/denoising.md`). A tile stops where its estimate errs to the low side; in a large
+/// picture, where others go on, it is looked at again.
+pub fn stops_err_by(tiles: usize) -> f64 {
+    if tiles < COMPANY { ESTIMATE_ERRS_BY } else { ERR_BY_IN_COMPANY }
+}
+
+/// The samples per pixel that tiles are to have, from those that each needs by itself. Needs are estimates: where they are
+/// low by chance, the power makes up for some of it. And what denoisers leave falls as n^−[`DENOISED_DECAY`], so that the
+/// same samples lose least in the mean as the 0.72th power of what brings all to one limit.
+fn drawn_together(needs: &[f64]) -> Vec<f64> {
+    let most = needs.iter().copied().fold(0.0, f64::max);
+    needs.iter().map(|need| need.powf(TOGETHER) * most.powf(1.0 - TOGETHER)).collect()
 }
 
 /// The two halves of a film, row-major; where one has no valid sample, it shows the other.
@@ -207,9 +251,9 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         let unknown = self.record.lock().unwrap_or_else(PoisonError::into_inner).error.is_none();
         let all_errors = if unknown && parts != [all] { self.estimate(view, &[all])? } else { Vec::new() };
         let eyes = VisionModel::new(&view.viewing);
-        let limit = self.lost / ESTIMATE_ERRS_BY;
+        let limit = self.lost / stops_err_by(grid.len());
         let unmet = Unmet::of(view.film, view.display, view.viewing);
-        let verdicts: Vec<Verdict> = tiles
+        let mut verdicts: Vec<Verdict> = tiles
             .par_iter()
             .map_init(VisionWorkspace::default, |room, &tile| {
                 let eyes = &mut Eyes { model: &eyes, room };
@@ -223,7 +267,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             .expect("each tile is in a part");
 
         // Of tiles that were done, what has been found elsewhere since can say that they lack it
-        tiles.iter().for_each(|tile| self.done[tile.index] = None);
+        let before: Vec<Option<Done>> = tiles.iter().map(|tile| self.done[tile.index].take()).collect();
         let earlier: Vec<(Tile, Done)> =
             grid.tiles().filter_map(|tile| Some((tile, self.done[tile.index]?))).collect();
         self.revised = earlier
@@ -236,10 +280,24 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             .flatten()
             .collect();
         self.revised.iter().for_each(|(tile, _)| self.done[tile.index] = None);
-        for (tile, verdict) in tiles.iter().zip(&verdicts).filter(|(_, verdict)| verdict.converged) {
+        for ((tile, verdict), before) in tiles.iter().zip(&verdicts).zip(before) {
             let (lost, undenoised) = (verdict.lost.unwrap_or_default(), verdict.undenoised);
-            self.done[tile.index] = Some(Done { lost, undenoised });
+            let spp = before.map_or(view.film.spp(tile.index), |before| before.spp);
+            self.done[tile.index] = verdict.converged.then_some(Done { lost, undenoised, spp });
         }
+        // Who is satisfied goes on beside those that are not
+        let together = self.together(view.film);
+        for (tile, verdict) in tiles.iter().zip(&mut verdicts) {
+            if let Some(spp) = together[tile.index] {
+                verdict.converged = false;
+                *verdict = verdict.expecting(Some(spp));
+            }
+        }
+        let others = grid.tiles().filter(|tile| !tiles.iter().any(|asked| asked.index == tile.index));
+        self.revised.extend(others.filter_map(|tile| {
+            let (spp, done) = (together[tile.index]?, self.done[tile.index]?);
+            Some((tile, Verdict::new(false).with_loss(done.lost, done.undenoised).expecting(Some(spp))))
+        }));
 
         let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
         all_errors.into_iter().chain(errors).for_each(|error| record.renew(error, tiles));
@@ -427,16 +485,18 @@ pub fn spp_with_denoising(
     let [da, db] = denoiser.denoise_both([&a, &b].map(|half| NoisyPicture::new(size, half)).each_ref())?;
     let error = DenoisedError::new(&DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] }, display)?;
     let tiles: Vec<Tile> = grid.tiles().collect();
-    let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
+    let needs = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
         let mut eyes = Eyes { model: &model, room };
-        let limit = limit / ESTIMATE_ERRS_BY;
+        let limit = limit / stops_err_by(tiles.len());
         let (here, _) = judged_by(&error, tile, limit, &mut eyes);
         let noise = noise_of(film, display, tile, Some(error.part(tile).shown().to_vec()));
-        let spp = eyes.needed_by_either([&here, &noise], limit, film.spp(tile.index))?;
-        Some(spp as f64 * tile.pixels() as f64)
+        Some(eyes.needed_by_either([&here, &noise], limit, film.spp(tile.index))? as f64)
     });
-    let samples: Option<Vec<f64>> = samples.collect();
-    Ok(samples.map(|samples| samples.iter().sum::<f64>() / (size.0 * size.1) as f64))
+    let needs: Option<Vec<f64>> = needs.collect();
+    let sum = |needs: Vec<f64>| -> f64 {
+        drawn_together(&needs).iter().zip(&tiles).map(|(spp, tile)| spp * tile.pixels() as f64).sum()
+    };
+    Ok(needs.map(|needs| sum(needs) / (size.0 * size.1) as f64))
 }
 
 /// The noise of a tile of the film, as displayed, on what is shown there, or on itself.

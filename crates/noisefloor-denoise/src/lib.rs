@@ -53,7 +53,9 @@ mod parts;
 mod record;
 mod thin;
 
-pub use criterion::{DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising};
+pub use criterion::{
+    DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising, stops_err_by,
+};
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
 pub use estimate::{DenoisedError, DenoisedExcess, DenoisedHalves, ESTIMATE_ERRS_BY};
 pub use guides::{GuideError, Guides};

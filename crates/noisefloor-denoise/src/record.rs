@@ -22,26 +22,32 @@ pub(crate) struct Done {
     pub lost: f64,
     /// Whether it is shown as rendered.
     pub undenoised: bool,
+    /// Samples per pixel that it had when it was first satisfied: since then, all verdicts on it were.
+    pub spp: u64,
 }
 
 impl Done {
-    /// A byte, 0 for an open tile, 1 for one that is done, 2 for one that is done as rendered; and eight for what it has lost,
-    /// little-endian.
-    pub(crate) fn to_bytes(done: Option<Self>) -> [u8; 9] {
-        let lost = done.map_or(0.0, |done| done.lost).to_le_bytes();
+    /// A byte, 0 for an open tile, 1 for one that is done, 2 for one that is done as rendered; and eight each for what it has
+    /// lost and its samples, little-endian.
+    pub(crate) fn to_bytes(done: Option<Self>) -> [u8; 17] {
         let kind = done.map_or(0, |done| 1 + u8::from(done.undenoised));
-        std::array::from_fn(|at| if at == 0 { kind } else { lost[at - 1] })
+        let (lost, spp) = done.map_or((0.0, 0), |done| (done.lost, done.spp));
+        let mut bytes = [kind; 17];
+        bytes[1..9].copy_from_slice(&lost.to_le_bytes());
+        bytes[9..].copy_from_slice(&spp.to_le_bytes());
+        bytes
     }
 
     /// What [`Done::to_bytes`] returned, for each tile; `None` if it did not.
     pub(crate) fn all_from_bytes(bytes: &[u8]) -> Option<Vec<Option<Self>>> {
-        let (tiles, rest) = bytes.as_chunks::<9>();
-        let tile = |&[kind, ref lost @ ..]: &[u8; 9]| {
-            let lost = f64::from_le_bytes(*lost);
-            let done = Self { lost, undenoised: kind == 2 };
+        let (tiles, rest) = bytes.as_chunks::<17>();
+        let tile = |bytes: &[u8; 17]| {
+            let (&kind, rest) = bytes.split_first()?;
+            let (&lost, spp) = rest.split_first_chunk::<8>()?;
+            let (lost, spp) = (f64::from_le_bytes(lost), u64::from_le_bytes(spp.try_into().ok()?));
             match kind {
-                0 if lost == 0.0 => Some(None),
-                1 | 2 if lost.is_finite() => Some(Some(done)),
+                0 if lost == 0.0 && spp == 0 => Some(None),
+                1 | 2 if lost.is_finite() => Some(Some(Self { lost, undenoised: kind == 2, spp })),
                 _ => None,
             }
         };
@@ -108,17 +114,20 @@ mod tests {
 
     #[test]
     fn so_are_tiles_that_are_done() {
-        let done = |lost, undenoised| Some(Done { lost, undenoised });
-        let tiles = [None, done(0.1, false), done(0.0, true), None];
+        let done = |lost, undenoised, spp| Some(Done { lost, undenoised, spp });
+        let tiles = [None, done(0.1, false, 48), done(0.0, true, u64::MAX), None];
         let bytes: Vec<u8> = tiles.into_iter().flat_map(Done::to_bytes).collect();
         assert_eq!(Done::all_from_bytes(&bytes).unwrap(), tiles);
         assert_eq!(Done::all_from_bytes(&[]).unwrap(), []);
+        let tile =
+            |kind: u8, lost: f64, spp: u64| [&[kind][..], &lost.to_le_bytes(), &spp.to_le_bytes()].concat();
         let spoiled = [
             &bytes[1..],
             &[&bytes[..], &[0]].concat(),
-            &[3; 9],
-            &[1, 0, 0, 0, 0, 0, 0, 0xf0, 0x7f],
-            &[0, 1, 0, 0, 0, 0, 0, 0, 0],
+            &tile(3, 0.0, 0),
+            &tile(1, f64::INFINITY, 0),
+            &tile(0, 0.1, 0),
+            &tile(0, 0.0, 1),
         ];
         for odd in spoiled {
             assert!(Done::all_from_bytes(odd).is_none(), "{odd:?}");

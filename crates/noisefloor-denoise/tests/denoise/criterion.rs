@@ -7,8 +7,8 @@ use noisefloor::{
     source::FirstHits,
 };
 use noisefloor_denoise::{
-    AuxiliaryPictures, DenoiseError, DenoisePasses, DenoisedError, DenoisedQuality, Denoiser,
-    ESTIMATE_ERRS_BY, Guides, NoisyPicture, compose, spp_with_denoising, spp_without_denoising,
+    AuxiliaryPictures, DenoiseError, DenoisePasses, DenoisedError, DenoisedQuality, Denoiser, Guides,
+    NoisyPicture, compose, spp_with_denoising, spp_without_denoising, stops_err_by,
 };
 use noisefloor_testkit::Noise;
 use noisefloor_vision::{VisionModel, VisionWorkspace};
@@ -69,7 +69,7 @@ fn a_plain_wall_is_done_sooner_when_denoised_and_a_smeared_one_is_not() {
     let record = denoised.criterion().record();
     let record = record.lock().unwrap();
     assert_eq!(record.error.as_ref().unwrap().size(), SIZE);
-    let allowed = 0.1 / ESTIMATE_ERRS_BY;
+    let allowed = 0.1 / stops_err_by(6);
     let verdicts: Vec<Verdict> = (0..6).filter_map(|tile| denoised.verdict(tile)).collect();
     assert!(verdicts.iter().all(|verdict| verdict.lost.unwrap() <= allowed), "{verdicts:?}");
     assert_eq!([0, 2, 3, 5].map(|tile| verdicts[tile].undenoised), [true, false, true, false]);
@@ -158,7 +158,7 @@ fn the_need_without_denoising_is_that_of_the_noisy_picture() {
     for (spp, tolerance) in [(40, 0.4), (200, 0.2)] {
         let session = sampled(Simple::Fails, spp);
         let (display, viewing) = (session.params().tone_mapping.settle(&truth()), session.params().viewing);
-        let limit = 0.1 / ESTIMATE_ERRS_BY;
+        let limit = 0.1 / stops_err_by(6);
         let found = spp_without_denoising(session.film(), &display, &truth(), viewing, limit).unwrap();
         assert!((found / needed).ln().abs() < tolerance, "{found} by {spp}, and {needed}");
     }
@@ -558,11 +558,10 @@ fn what_is_found_late_opens_denoised_tiles_that_had_stopped_and_does_after_a_res
     round_with(&mut session, find);
     let open = |session: &Session<_>| (0..6).filter(|&tile| session.is_open(tile)).collect::<Vec<_>>();
     assert_eq!(open(&session), [0, 3]);
-    let lost = session.verdict(4).unwrap().lost;
     let mut bytes = Vec::new();
     session.checkpoint("late").unwrap().write(&mut bytes).unwrap();
     let mut resumed = knows_the_wall().resume("late", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
-    while open(&session).len() == 2 {
+    while !session.verdict(4).unwrap().unmet {
         [&mut session, &mut resumed].into_iter().for_each(|session| round_with(session, find));
         assert!(session.film().spp(3) < 1_000, "nothing opens");
     }
@@ -572,5 +571,41 @@ fn what_is_found_late_opens_denoised_tiles_that_had_stopped_and_does_after_a_res
         assert_eq!(session.verdict(tile), resumed.verdict(tile), "{tile}");
     }
     let verdict = session.verdict(4).unwrap();
-    assert!(verdict.unmet && verdict.lost == lost, "{verdict:?}");
+    assert!(verdict.unmet && verdict.lost.is_some(), "{verdict:?}");
+}
+
+/// A tile that is satisfied goes on beside the others: to the 0.72th power of its need times the 0.28th of the greatest,
+/// or as near as a step of 1.2 is, and is judged there. So it is after a resume.
+#[test]
+fn counts_are_drawn_together() {
+    let nothing = Find { tile: 0, pixel: 0, sample: u64::MAX, light: 0.0 };
+    let mut session = knows_the_wall();
+    let (mut first, mut resumed) = ([None; 6], false);
+    let mut rounds = 0;
+    while !session.is_done() && rounds < 1_000 {
+        round_with(&mut session, nothing);
+        for tile in 0..6 {
+            let converged = session.verdict(tile).is_some_and(|verdict| verdict.converged);
+            first[tile] = first[tile].or(converged.then(|| session.film().spp(tile)));
+        }
+        if session.open_tiles() < 4 && !resumed {
+            let mut bytes = Vec::new();
+            session.checkpoint("together").unwrap().write(&mut bytes).unwrap();
+            session = knows_the_wall().resume("together", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+            resumed = true;
+        }
+        rounds += 1;
+    }
+    let needs = first.map(|spp| spp.unwrap() as f64);
+    let most = needs.into_iter().fold(0.0, f64::max);
+    println!("{needs:?} {:?}", (0..6).map(|tile| session.film().spp(tile)).collect::<Vec<_>>());
+    assert!(resumed && most > 8.0 * needs[4], "{needs:?}");
+    for (tile, need) in needs.into_iter().enumerate() {
+        let (spp, wanted) = (session.film().spp(tile) as f64, need.powf(0.72) * most.powf(0.28));
+        // No verdict was against a plain tile: this denoiser knows them
+        let least = if [0, 3].contains(&tile) { need } else { wanted / 1.2 };
+        assert!(spp >= least && spp <= most, "{tile}: {spp} of {wanted}");
+    }
+    // They had less when they were let go for the first time
+    assert!([1, 2, 4, 5].into_iter().all(|tile| session.film().spp(tile) as f64 > needs[tile]));
 }

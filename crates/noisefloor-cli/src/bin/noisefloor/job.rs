@@ -15,8 +15,8 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 /// The first verdict on denoised halves of the built-in renderer, in samples per pixel: what two denoisings cost is worth
-/// more of its samples than of slower renderers', and earlier stops lose more (docs/benchmarks/tiles.md).
-pub const FIRST_DENOISED: u64 = 48;
+/// more of its samples than of slower renderers' (docs/benchmarks/where.md).
+pub const FIRST_DENOISED: u64 = 32;
 
 /// What is rendered, who stops it, and until when: all that picture and stops depend on. Values are
 /// checked; what it names is read when it is set up.

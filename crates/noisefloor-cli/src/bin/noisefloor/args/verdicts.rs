@@ -42,7 +42,7 @@ pub struct VerdictArgs {
     #[arg(long, value_name = "WHO", value_parser = values::audience)]
     pub audience: Option<Audience>,
     /// No tile stops before this many samples per pixel [default: 16, or one batch with --batch; with
-    /// --denoise 48 of the built-in renderer]. Below 100, only tiles stop whose noise is spread over many pixels, in
+    /// --denoise 32 of the built-in renderer]. Below 100, only tiles stop whose noise is spread over many pixels, in
     /// pictures of two million samples. More find more of the light that is seldom found.
     #[arg(long, value_name = "SPP")]
     pub min_spp: Option<u64>,

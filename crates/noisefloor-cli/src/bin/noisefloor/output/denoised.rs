@@ -5,7 +5,7 @@ use super::Output;
 use noisefloor::{Rgb, Session, source::FirstHits};
 use noisefloor_cli::say::{NotSaid, note, say};
 use noisefloor_denoise::{
-    DenoisedRecord, Denoiser, ESTIMATE_ERRS_BY, Guides, NoisyPicture, compose, spp_without_denoising,
+    DenoisedRecord, Denoiser, Guides, NoisyPicture, compose, spp_without_denoising, stops_err_by,
 };
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
@@ -184,9 +184,10 @@ impl Output {
             )?;
         }
         if let Some(lost) = jods_lost {
+            let errs = stops_err_by(grid.len());
             say!(
                 "the worst tile has lost {lost:.3} JOD, \
-                 by an estimate that 19 of 20 tiles exceed by less than ×{ESTIMATE_ERRS_BY}; \
+                 by an estimate that 19 of 20 tiles exceed by less than ×{errs}; \
                  nobody has been asked about denoised tiles"
             )?;
         }
