@@ -21,9 +21,9 @@ pub struct VerdictArgs {
     )]
     pub criterion: CriterionChoice,
     /// With --denoise: just-objectionable differences (JOD) that a tile may have lost when it stops; 19 of
-    /// 20 have lost less, so it stops at an estimate of two thirds of that. At 1, three of four people prefer
-    /// the converged picture; the default is what zones had lost, on average, where people stopped seeing
-    /// noise in them.
+    /// 20 have lost less, so it stops at an estimate of 1/1.1 of that, or of two thirds in pictures of fewer
+    /// than 16 tiles. At 1, three of four people prefer the converged picture; the default is what zones had
+    /// lost, on average, where people stopped seeing noise in them.
     #[arg(
         long,
         value_name = "JOD",

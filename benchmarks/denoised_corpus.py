@@ -1,0 +1,451 @@
+#!/usr/bin/env python3
+"""What a corpus of small scenes says of the estimate of denoised pictures, and of where samples go: docs/benchmarks/where.md.
+
+    random_scenes.py SCENES 8                           writes scenes of four families
+    denoised_corpus.py mitsuba VARIANT OUT SCENE.xml…   renders halves and references of 128×128 pixels by Mitsuba (cuda_ad_rgb)
+    denoised_corpus render OUT/NAME SCENE.xml 128       denoises them (an example of noisefloor-cli; renders what is not there)
+    denoised_corpus estimate OUT/NAME > OUT/NAME/estimate.csv
+    denoised_corpus.py gather EXAMPLE OUT > denoised-corpus.csv
+    denoised_corpus.py tables denoised-corpus.csv
+
+The parts of the estimate are computed here a second time, with numpy, and no code of noisefloor-denoise; the example is asked for
+JODs only, and those of `check` come from the PyPI package cvvdp. Needs numpy and scipy; mitsuba, or pycvvdp, where asked for."""
+import argparse
+import csv
+import itertools
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+
+EDGE, TILE, SQUARE = 128, 32, 64
+TILES = [(x, y) for y in range(0, EDGE, TILE) for x in range(0, EDGE, TILE)]
+# Of both halves together
+LEVELS = np.array([16, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024])
+REFERENCE, AT_ONCE = 8192, 512
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+LIMIT, LEAST, DECAY = 0.3, 1e-3, 0.38
+# Tiles whose reference has itself lost as much are left out
+NOISY_REFERENCE = 0.1
+# The rule: power, step, margin from 16 tiles on
+TOGETHER, STEP, MARGIN = 0.72, 1.2, 1.1
+BEFORE = 1.5
+# What verdicts count the mean of four as
+GAIN = 0.97
+COLUMNS = "estimate true noisy noise variance sum change dammertz relative".split()
+
+
+def load(folder, name, channels=3):
+    values = np.fromfile(folder / name, dtype="<f4").astype(np.float64)
+    return values.reshape(EDGE, EDGE, channels) if channels > 1 else values.reshape(EDGE, EDGE)
+
+
+def mitsuba(args):
+    import mitsuba as mi
+
+    mi.set_variant(args.variant)
+    for path in map(pathlib.Path, args.scenes):
+        out = args.out / path.parent.name
+        out.mkdir(parents=True, exist_ok=True)
+        scene = mi.load_file(str(path))
+        take = lambda spp, seed: np.array(mi.render(scene, spp=spp, seed=seed), dtype=np.float64)
+        for half, name in enumerate("ab", 1):
+            total = 0.0
+            for i, level in enumerate(LEVELS):
+                step = int(level - (LEVELS[i - 1] if i else 0)) // 2
+                total = total + take(step, 1000 * half + i) * step
+                (total / (level // 2)).astype("<f4").tofile(out / f"{name}-{level:05}.f32")
+            rest = REFERENCE // AT_ONCE
+            (sum(take(AT_ONCE, 1000 * (half + 2) + i) for i in range(rest)) / rest).astype("<f4").tofile(out / f"reference-{name}.f32")
+
+
+class Display:
+    """Reinhard's operator as noisefloor has it, with the exposure that this picture asks for."""
+
+    def __init__(self, picture):
+        light = picture @ LUMINANCE
+        light = light[light > 0]
+        mean = np.exp(np.log(light).mean())
+        self.exposure = 0.18 / np.exp(np.log(1e-4 * mean + light).mean())
+
+    def luma(self, picture):
+        exposed = np.maximum(picture * self.exposure, 0)
+        linear = np.minimum(exposed / (1 + exposed @ LUMINANCE)[..., None], 1)
+        return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-12) ** (1 / 2.4) - 0.055) @ LUMINANCE
+
+
+def split(plane, level):
+    from scipy.ndimage import convolve1d
+
+    spline = np.zeros(4 * 2**level + 1)
+    spline[:: 2**level] = np.array([1, 4, 6, 4, 1]) / 16
+    rest = convolve1d(convolve1d(plane, spline, axis=1, mode="mirror"), spline, axis=0, mode="mirror")
+    return plane - rest, rest
+
+
+def around(plane, radius):
+    """The mean of what lies in the picture, and of how many pixels."""
+    from scipy.ndimage import uniform_filter
+
+    inside = uniform_filter(np.ones_like(plane), 2 * radius + 1, mode="constant")
+    return uniform_filter(plane, 2 * radius + 1, mode="constant") / inside, inside * (2 * radius + 1) ** 2
+
+
+def common(a, b, radius, errors):
+    """What two residuals have in common, scale by scale, less so many standard errors of it."""
+    found = np.zeros_like(a)
+    for scale in range(6):
+        (fine_a, a), (fine_b, b) = (split(a, scale), split(b, scale)) if scale < 5 else ((a, a), (b, b))
+        product = fine_a * fine_b
+        shared, count = around(product, radius)
+        energy, _ = around(0.25 * (fine_a + fine_b) ** 2, radius)
+        spread = np.maximum(around(product**2, radius)[0] - shared**2, 0)
+        # Of a scale, as many values are independent as fit
+        shared = shared - errors * np.sqrt(spread * np.minimum(2 * 4.0**scale / count, 1))
+        found += np.sqrt(np.clip(shared / np.maximum(energy, 1e-30), 0, 1)) * 0.5 * (fine_a + fine_b)
+    return found
+
+
+def planes(folder, level, display):
+    """What is shown; half the difference of the denoised halves; both residuals; how far all samples, denoised, are from the mean."""
+    a, b, da, db, once = (load(folder, f"{name}-{level:05}.f32") for name in ("a", "b", "da", "db", "once"))
+    mean = np.maximum(0.5 * (da + db), 0)
+    step = np.maximum(0.02 * mean.max(axis=2), 1e-4 / display.exposure)
+    residuals = [np.zeros((EDGE, EDGE)), np.zeros((EDGE, EDGE))]
+    for c in range(3):
+        up, down = mean.copy(), mean.copy()
+        up[..., c], down[..., c] = mean[..., c] + step, np.maximum(mean[..., c] - step, 0)
+        slope = (display.luma(up) - display.luma(down)) / (up[..., c] - down[..., c])
+        for residual, noisy, denoised in zip(residuals, (a, b), (da, db)):
+            residual += slope * (noisy[..., c] - denoised[..., c])
+    shown, one, other = display.luma(mean), display.luma(da), display.luma(db)
+    most = 0.5 * np.abs(one - other)
+    held = np.clip((shown - 0.5 * (one + other)) / np.maximum(most, 1e-30), 0, 1) ** 2
+    difference = 0.5 * (1 + held) * (one - other)
+    difference = -difference if (difference**3).sum() < 0 else difference
+    clean = np.where(difference > 0, shown - held * np.abs(one - other), shown)
+    return clean, difference, *(np.clip(r, -0.5, 0.5) for r in residuals), display.luma(once) - shown
+
+
+def square(x, y):
+    at = lambda v: min(max(v + TILE // 2 - SQUARE // 2, 0), EDGE - SQUARE)
+    return at(x), at(y)
+
+
+class Jods:
+    """Pairs for the example, and what it says of them: the lesser of a tile and the square around it."""
+
+    def __init__(self, example):
+        self.example, self.data, self.keys = example, [], []
+
+    def ask(self, key, shown, field):
+        for tile, (x, y) in enumerate(TILES):
+            for (left, top), edge in (((x, y), TILE), (square(x, y), SQUARE)):
+                reference = shown[top:top + edge, left:left + edge]
+                test = reference + field[top:top + edge, left:left + edge]
+                self.data.append(np.uint32(edge).tobytes() + test.astype("<f4").tobytes() + reference.astype("<f4").tobytes())
+                self.keys.append((*key, tile))
+
+    def answers(self):
+        said = subprocess.run([self.example, "jods"], input=b"".join(self.data), capture_output=True, check=True).stdout.split()
+        found = {}
+        for key, lost in zip(self.keys, map(float, said)):
+            found[key] = min(found.get(key, 10.0), lost)
+        return found
+
+
+def plain_rules(folder, level, exposure):
+    """Dammertz et al.'s criterion, and the relative standard error, of each tile."""
+    a, b = (exposure * load(folder, f"{name}-{level:05}.f32") for name in "ab")
+    mean = 0.5 * (a + b)
+    rules = (np.abs(mean - a).sum(-1) / np.sqrt(np.maximum(mean.sum(-1), 1e-9)), np.abs(a - b).sum(-1) / 2 / np.maximum(mean.sum(-1), 1e-3))
+    return [rule.reshape(4, TILE, 4, TILE).mean((1, 3)).ravel() for rule in rules]
+
+
+def gather(args):
+    rows = csv.writer(sys.stdout)
+    rows.writerow(["scene", "spp", "tile", *COLUMNS])
+    for folder in sorted(args.out.iterdir()):
+        if not (folder / "estimate.csv").exists():
+            continue
+        found = {}
+        for _, spp, tile, kind, own, around_ in csv.reader(open(folder / "estimate.csv")):
+            found[int(spp), kind, int(tile)] = min(float(own), float(around_))
+        display = Display(0.5 * (load(folder, "reference-a.f32") + load(folder, "reference-b.f32")))
+        jods = Jods(args.example)
+        for level in LEVELS:
+            shown, difference, a, b, change = planes(folder, level, display)
+            jods.ask((level, "variance"), shown, difference)
+            jods.ask((level, "sum"), shown, 1.4 * difference + common(a, b, 16, 1.0))
+            jods.ask((level, "change"), shown, 1.4 * difference + 1.5 * change)
+            jods.ask((level, "noise"), load(folder, f"on-{level:05}.luma", 1), load(folder, f"noise-{level:05}.luma", 1))
+            for name, values in zip(("dammertz", "relative"), plain_rules(folder, level, display.exposure)):
+                found.update({(level, name, tile): value for tile, value in enumerate(values)})
+        found.update(jods.answers())
+        for tile in range(len(TILES)):
+            rows.writerow([folder.name, 0, tile, "", f"{found[0, 'reference', tile]:.3f}", *[""] * (len(COLUMNS) - 2)])
+            for level in LEVELS:
+                rows.writerow([folder.name, level, tile, *(f"{found[level, name, tile]:.4f}" for name in COLUMNS)])
+
+
+def check(args):
+    """True losses of squares of 64 by the PyPI package, beside those of the example."""
+    import pycvvdp
+
+    metric = pycvvdp.cvvdp(display_name="standard_fhd", quiet=True)
+    ratios = []
+    for folder in args.folders:
+        said = {(int(r[1]), r[3], int(r[2])): float(r[5]) for r in csv.reader(open(folder / "estimate.csv"))}
+        truth = 0.5 * (load(folder, "reference-a.f32") + load(folder, "reference-b.f32"))
+        display = Display(truth)
+        for level in (32, 128):
+            shown, reference = display.luma(load(folder, f"shown-{level:05}.f32")), display.luma(truth)
+            for tile, (x, y) in enumerate(TILES):
+                if (x // TILE + y // TILE) % 3:
+                    continue
+                left, top = square(x, y)
+                grey = [np.repeat(p[top:top + SQUARE, left:left + SQUARE, None], 3, 2).astype(np.float32) for p in (shown, reference)]
+                lost = 10 - float(metric.predict(*grey, dim_order="HWC")[0])
+                ratios.append((lost, said[level, "true", tile]))
+                print(f"{folder.name} {level} {tile}: {lost:.4f} {said[level, 'true', tile]:.4f}")
+    pairs = np.array(ratios)
+    print(f"largest difference {np.abs(pairs[:, 0] - pairs[:, 1]).max():.5f} of {len(pairs)}")
+
+
+def family(name):
+    head = name.rsplit("-", 1)[0]
+    return head if head in ("rooms", "glass", "outside", "leaves") else "files"
+
+
+class Corpus:
+    """All values by scene, level and tile."""
+
+    def __init__(self, path):
+        rows = list(csv.DictReader(open(path)))
+        self.names = sorted({row["scene"] for row in rows})
+        shape = (len(self.names), len(LEVELS), len(TILES))
+        self.values = {name: np.full(shape, np.nan) for name in COLUMNS}
+        self.reference = np.full((shape[0], shape[2]), np.nan)
+        place, level = {n: i for i, n in enumerate(self.names)}, {int(n): i for i, n in enumerate(LEVELS)}
+        for row in rows:
+            s, t = place[row["scene"]], int(row["tile"])
+            if row["spp"] == "0":
+                self.reference[s, t] = float(row["true"])
+                continue
+            for name in COLUMNS:
+                self.values[name][s, level[int(row["spp"])], t] = float(row[name])
+        self.true, self.good = self.values["true"], self.reference < NOISY_REFERENCE
+        self.families = np.array([family(name) for name in self.names])
+        # Scenes with a reference in half of their tiles at least
+        self.scenes = [s for s in range(shape[0]) if self.good[s].sum() >= len(TILES) // 2]
+
+
+SPP = np.append(LEVELS, 2 * LEVELS[-1]).astype(float)
+
+
+def first_below(values, limit, first):
+    """The first level at which each tile is at most at its limit; beyond the last one if none."""
+    below = (values <= limit) & (LEVELS >= first)[None, :, None]
+    return np.where(below.any(1), below.argmax(1), len(LEVELS))
+
+
+def play(estimate, first, limit, power):
+    """The rule as it runs, in one picture of tiles × levels: the last level of each tile, and whether it was satisfied there."""
+    levels = np.full(len(estimate), np.searchsorted(LEVELS, first))
+    need, fresh = np.full(len(estimate), -1), np.ones(len(estimate), bool)
+    while True:
+        for i in np.flatnonzero(fresh):
+            satisfied = levels[i] < len(LEVELS) and estimate[i, levels[i]] <= limit
+            need[i] = (need[i] if need[i] >= 0 else levels[i]) if satisfied else -1
+        done = need >= 0
+        most = np.where(done, SPP[need], SPP[levels]).max()
+        wanted = SPP[np.maximum(need, 0)] ** power * most ** (1 - power)
+        fresh = (levels < len(LEVELS)) & (~done | (wanted >= STEP * SPP[levels]))
+        if not fresh.any():
+            return levels, done
+        levels = levels + fresh
+
+
+def measures(lost):
+    return [lost.max(), np.quantile(lost, 0.95), np.median(lost), lost.mean()]
+
+
+def run(corpus, pictures, first, margin, power, estimate=None):
+    """Samples and losses of each picture, a list of (scene, tile); and the losses, over the limit, of all tiles that were satisfied."""
+    estimate = GAIN * corpus.values["estimate"] if estimate is None else estimate
+    true = np.concatenate([corpus.true, corpus.true[:, -1:]], 1)
+    rows, lost = [], []
+    for picture in pictures:
+        s, t = np.array(picture).T
+        levels, done = play(estimate[s, :, t], first, LIMIT / margin, power)
+        found = true[s, levels, t]
+        rows.append([SPP[levels].mean(), *measures(found)])
+        lost += [(family(corpus.names[scene]), value / LIMIT) for scene, value in zip(s[done], found[done])]
+    return np.array(rows), lost
+
+
+def mean_of(rows):
+    return np.exp(np.log(np.maximum(rows, LEAST)).mean(0))
+
+
+def pictures_of(corpus, scenes_each, count=24):
+    draw = np.random.default_rng(7)
+    chosen = [[s] for s in corpus.scenes] if scenes_each == 1 else [draw.choice(corpus.scenes, scenes_each, replace=False) for _ in range(count)]
+    return [[(s, t) for s in some for t in range(len(TILES)) if corpus.good[s, t]] for some in chosen]
+
+
+def where(corpus):
+    print("\n| pictures | first | power | margin | samples | worst | most of 20 | median | mean | beyond | the worst of these |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    kinds = [("one tile", [[(s, t)] for s in corpus.scenes for t in range(16) if corpus.good[s, t]])]
+    kinds += [("one scene, 16 tiles", pictures_of(corpus, 1)), ("four scenes", pictures_of(corpus, 4)), ("twelve scenes", pictures_of(corpus, 12))]
+    for (name, pictures), (first, power, margin) in itertools.product(
+            kinds, [(48, 1, 1.5), (48, 1, 1.3), (48, 0.72, 1.1), (32, 0.72, 1.1), (16, 0.72, 1.1), (32, 0.5, 1.1)]):
+        rows, lost = run(corpus, pictures, first, margin, power)
+        beyond = np.array([value for _, value in lost])
+        m = mean_of(rows)
+        print(f"| {name} | {first} | {power} | ×{margin} | {m[0]:.0f} | " + " | ".join(f"{v:.3f}" for v in m[1:])
+              + f" | {100 * (beyond > 1).mean():.1f} % | ×{beyond.max():.2f} |", flush=True)
+    _, lost = run(corpus, pictures_of(corpus, 1), 32, MARGIN, TOGETHER)
+    for name in np.unique(corpus.families):
+        values = np.array([value for kind, value in lost if kind == name])
+        print(f"{name}: {(values > 1).sum()} of {len(values)} beyond, ×{values.max():.2f}")
+
+
+def uniform_as_good(corpus, s, lost, measure):
+    """Samples after which one count for all has lost as little; beyond the last level as losses fall on average."""
+    curve = np.minimum.accumulate([measure(corpus.true[s, l][corpus.good[s]]) for l in range(len(LEVELS))])
+    if curve[0] <= lost:
+        return SPP[0]
+    if curve[-1] > lost:
+        return SPP[len(LEVELS) - 1] * (curve[-1] / lost) ** (1 / DECAY)
+    at = int(np.argmax(curve <= lost))
+    share = np.log(curve[at - 1] / lost) / np.log(curve[at - 1] / curve[at])
+    return SPP[at - 1] * (SPP[at] / SPP[at - 1]) ** share
+
+
+def rivals(corpus):
+    true = np.concatenate([corpus.true, corpus.true[:, -1:]], 1)
+    lost_at = lambda levels: np.take_along_axis(true, levels[:, None, :], 1)[:, 0]
+
+    def ours(first, margin, power):
+        levels = np.zeros(corpus.good.shape, int)
+        for s in corpus.scenes:
+            t = np.flatnonzero(corpus.good[s])
+            levels[s, t], _ = play(GAIN * corpus.values["estimate"][s][:, t].T, first, LIMIT / margin, power)
+        return levels
+
+    def hindsight(rule):
+        """With the largest constant that keeps 19 of 20 tiles within the limit in all other families."""
+        levels = np.zeros(corpus.good.shape, int)
+        for name in np.unique(corpus.families):
+            others = corpus.good & (corpus.families != name)[:, None]
+            for constant in np.exp(np.arange(2, -9, -0.05)):
+                found = first_below(corpus.values[rule], constant, 16)
+                let_go = others & (found < len(LEVELS))
+                if (lost_at(found)[let_go] > LIMIT).mean() <= 0.05:
+                    break
+            levels[corpus.families == name] = found[corpus.families == name]
+        return levels
+
+    print("\n| | samples | worst, most of 20, median, mean | beyond | uniform as good: worst | most of 20 | median | mean | behind uniform by most of 20 |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    rules = {"before: to the limit, margin ×1.5, from 48": ours(48, BEFORE, 1), "drawn together, ×1.1, from 32": ours(32, MARGIN, TOGETHER),
+             "Dammertz et al., 0.0046": first_below(corpus.values["dammertz"], 0.0046, 16),
+             "Dammertz et al., best constant": hindsight("dammertz"), "relative error, best constant": hindsight("relative"),
+             "truth known": first_below(corpus.true, LIMIT, 16)}
+    names = (np.max, lambda v: np.quantile(v, 0.95), np.median, np.mean)
+    for label, levels in rules.items():
+        lost, rows = lost_at(levels), []
+        for s in corpus.scenes:
+            good = corpus.good[s]
+            own = measures(lost[s][good])
+            count = SPP[levels[s]][good].mean()
+            rows.append([count, *own, *(uniform_as_good(corpus, s, max(v, LEAST), f) / count for v, f in zip(own, names))])
+        rows = np.array(rows)
+        m, middle = mean_of(rows), np.median(rows, axis=0)
+        let_go = np.zeros_like(corpus.good)
+        let_go[corpus.scenes] = True
+        let_go &= corpus.good & (levels < len(LEVELS))
+        share = f"{100 * (lost[let_go] > LIMIT).mean():.1f} %" if let_go.any() else "–"
+        print(f"| {label} | {m[0]:.0f} | " + ", ".join(f"{v:.2f}" for v in m[1:5]) + f" | {share} | "
+              + " | ".join(f"×{middle[k]:.2f} (×{m[k]:.2f})" for k in range(5, 9)) + f" | {(rows[:, 6] < 0.999).sum()} of {len(rows)} |")
+
+
+def estimates(corpus):
+    """Linear in logarithms, fitted without the family of each scene; margins, too."""
+    log = lambda values: np.log(np.maximum(values, LEAST))
+    target, true = log(corpus.true), corpus.true
+    usable = corpus.good[:, None, :] & (true > 0.02) & (true < 1.5)
+    weight = np.exp(-0.25 * ((target - np.log(0.25)) / 0.8) ** 2)
+    chosen = {"as it is": ["estimate"], "and the noise's own loss": ["estimate", "noise"], "variance alone": ["variance"],
+              "1.4 variance, bias beyond chance": ["sum"], "the same and the noise's own loss": ["sum", "noise"],
+              "1.4 variance, 1.5 of what twice the samples change": ["change"], "the same and the noise's own loss ": ["change", "noise"],
+              "all of these": ["estimate", "variance", "sum", "change", "noise"]}
+    print("\n| estimate | scatter near the limit | margin | samples | beyond | drawn together: margin | samples | mean loss | beyond |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    pictures = pictures_of(corpus, 1)
+    for label, columns in chosen.items():
+        values = np.stack([np.ones_like(target), *(log(corpus.values[name]) for name in columns)], -1)
+        predicted = np.empty_like(target)
+        for name in np.unique(corpus.families):
+            own = corpus.families == name
+            fit = usable & ~own[:, None, None]
+            if len(columns) == 1:
+                shift = np.average((target - values[..., 1])[fit], weights=weight[fit] ** 2)
+                predicted[own] = values[own][..., 1] + shift
+            else:
+                factors = np.linalg.lstsq(values[fit] * weight[fit][:, None], target[fit] * weight[fit], rcond=None)[0]
+                predicted[own] = values[own] @ factors
+        estimate = np.exp(predicted)
+        near = usable & (np.abs(true - LIMIT) < 0.2)
+        cells = []
+        for power in (1, TOGETHER):
+            rows, lost, margins = [], [], []
+            for name in np.unique(corpus.families):
+                split_ = [[p for p in pictures if (corpus.families[p[0][0]] == name) == own] for own in (True, False)]
+                for margin in np.exp(np.arange(-0.2, 0.9, 0.03)):
+                    _, others = run(corpus, split_[1], 32, margin, power, estimate)
+                    if np.mean([value > 1 for _, value in others]) <= 0.05:
+                        break
+                found, own = run(corpus, split_[0], 32, margin, power, estimate) if split_[0] else (np.empty((0, 5)), [])
+                rows, lost, margins = [*rows, *found], lost + own, [*margins, margin]
+            m = mean_of(np.array(rows))
+            cells += [f"×{min(margins):.2f} to ×{max(margins):.2f}", f"{m[0]:.0f}"] + ([f"{m[4]:.3f}"] if power < 1 else [])
+            cells += [f"{100 * np.mean([value > 1 for _, value in lost]):.1f} %"]
+        print(f"| {label} | ×{np.exp((predicted - target)[near].std()):.2f} | " + " | ".join(cells) + " |", flush=True)
+
+
+def tables(args):
+    corpus = Corpus(args.rows)
+    print(f"{len(corpus.names)} scenes, {len(corpus.scenes)} with a reference; {(~corpus.good).sum()} of {corpus.good.size} tiles left out")
+    where(corpus)
+    rivals(corpus)
+    estimates(corpus)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(required=True)
+    command = commands.add_parser("mitsuba")
+    command.add_argument("variant")
+    command.add_argument("out", type=pathlib.Path)
+    command.add_argument("scenes", nargs="+")
+    command.set_defaults(run=mitsuba)
+    command = commands.add_parser("gather")
+    command.add_argument("example")
+    command.add_argument("out", type=pathlib.Path)
+    command.set_defaults(run=gather)
+    command = commands.add_parser("check")
+    command.add_argument("folders", nargs="+", type=pathlib.Path)
+    command.set_defaults(run=check)
+    command = commands.add_parser("tables")
+    command.add_argument("rows", type=pathlib.Path)
+    command.set_defaults(run=tables)
+    args = parser.parse_args()
+    args.run(args)
+
+
+if __name__ == "__main__":
+    main()
