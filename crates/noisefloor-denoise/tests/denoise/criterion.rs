@@ -584,9 +584,9 @@ fn counts_are_drawn_together() {
     let mut rounds = 0;
     while !session.is_done() && rounds < 1_000 {
         round_with(&mut session, nothing);
-        for tile in 0..6 {
+        for (tile, first) in first.iter_mut().enumerate() {
             let converged = session.verdict(tile).is_some_and(|verdict| verdict.converged);
-            first[tile] = first[tile].or(converged.then(|| session.film().spp(tile)));
+            *first = first.or(converged.then(|| session.film().spp(tile)));
         }
         if session.open_tiles() < 4 && !resumed {
             let mut bytes = Vec::new();
