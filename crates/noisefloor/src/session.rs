@@ -439,7 +439,10 @@ impl<C: StoppingCriterion> Session<C> {
                 stops.extend(self.take(tile.index, verdict, open));
             }
             // What other tiles have met can say of a tile that it lacks light
-            for (tile, verdict) in self.criterion.revised() {
+            let revised = self.criterion.revised();
+            // Many that are opened again make the next round one of many
+            let open = open.max(revised.len() as f64 / self.tiles.len() as f64);
+            for (tile, verdict) in revised {
                 stops.extend(self.take_again(tile.index, verdict, open));
             }
         }

@@ -320,3 +320,48 @@ fn running_means_of_pictures_are_those_of_tiles() {
     assert!(matches!(whole.push_running_image(9, &picture(1.0)[1..]), Err(SessionError::Image { .. })));
     assert!(matches!(whole.push_running_image(8, &picture(1.0)), Err(SessionError::Film(_))));
 }
+
+/// All tiles but the last are satisfied at first, and opened again after that.
+struct Opens(Vec<(Tile, Verdict)>);
+
+impl StoppingCriterion for Opens {
+    fn name(&self) -> String {
+        "opens".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let grid = view.film.grid();
+        if tiles.len() == 1 {
+            let others = grid.tiles().filter(|tile| tile.index != tiles[0].index);
+            self.0 = others.map(|tile| (tile, Verdict::new(false).expecting(Some(40)))).collect();
+        }
+        Ok(tiles.iter().map(|tile| Verdict::new(tile.index + 1 < grid.len())).collect())
+    }
+
+    fn revised(&mut self) -> Vec<(Tile, Verdict)> {
+        std::mem::take(&mut self.0)
+    }
+}
+
+/// A verdict on few tiles is dear, so that a few that are open take twice as many samples before the next; many that are opened
+/// again are not few.
+#[test]
+fn many_tiles_that_are_opened_again_take_no_larger_steps_than_many_that_are_open() {
+    let params =
+        Params::default().with_tile(16).with_min_spp(32).with_schedule(Schedule::Growing { step: 16 });
+    let mut session = Session::new(160, 16, Opens(vec![]), params).unwrap();
+    for _ in 0..2 {
+        for request in session.requests() {
+            let mean = vec![[0.3; 3]; request.tile.pixels()];
+            session.push(request.tile.index, request.spp, &mean).unwrap();
+        }
+        session.judge().unwrap();
+    }
+    assert_eq!(session.open_tiles(), 10);
+    let goals: Vec<u64> = session.requests().iter().map(|request| request.first + request.spp).collect();
+    assert_eq!(goals[..9], [48; 9]);
+}
