@@ -45,7 +45,8 @@ struct Columns {
 impl Columns {
     /// Runs of columns that show one column of tiles, with the place of that in the grid.
     fn by_tile(&self, grid: TileGrid) -> Vec<(Range<usize>, usize)> {
-        let mut runs: Vec<(Range<usize>, usize)> = Vec::new();
+        // The tile's own, and one to each side, as a rule
+        let mut runs: Vec<(Range<usize>, usize)> = Vec::with_capacity(3);
         for (at, &x) in self.all.iter().enumerate() {
             let column = grid.index_at(x, 0);
             match runs.last_mut() {

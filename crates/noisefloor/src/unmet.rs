@@ -40,6 +40,9 @@ const NOTHING: f32 = 0.5 / 255.0;
 /// Exposed radiance of an average grey.
 const GREY: f32 = 0.18;
 
+/// Pixels of a row that are looked at together.
+const AT_ONCE: usize = 64;
+
 /// A sample of more times an average grey is an accident of arithmetic, and tells of no light. If it did, billions of
 /// samples, thousands of each pixel of 1280×800, would have to be taken before a second such find could go unseen.
 const ACCIDENT: f32 = 1e7;
@@ -66,8 +69,6 @@ impl MetOnce {
         }
         let mut halves = [Rows::new(tile.width), Rows::new(tile.width)];
         let of_tile = HalfSamples::new(film.half_counts(tile.index));
-        let mut found = vec![0.0; tile.width];
-        let [mut excess_a, mut excess_b] = [(); 2].map(|()| vec![0.0; tile.width]);
         let inside = |y: usize| y.min(grid.height() - 1);
         for (half, rows) in halves.iter_mut().enumerate() {
             rows.push(film, half, tile, tile.y.saturating_sub(1));
@@ -79,16 +80,24 @@ impl MetOnce {
                 rows.find_highest();
             }
             let [a, b] = &halves;
-            excesses([a.here(), b.here()], [&a.highest, &b.highest], [&mut excess_a, &mut excess_b]);
+            let own = [a.here(), b.here()];
+            let around = [&a.highest[..], &b.highest];
             if film.rejected() == 0 {
-                found_row([&excess_a, &excess_b], of_tile, accident, &mut found);
-                found.iter().for_each(|&light| met.add(light, of_tile));
+                let mut found = [0.0; AT_ONCE];
+                for from in (0..tile.width).step_by(AT_ONCE) {
+                    let found = &mut found[..AT_ONCE.min(tile.width - from)];
+                    let here = from..from + found.len();
+                    let [own, around] = [own, around].map(|rows| rows.map(|row| &row[here.clone()]));
+                    found_row(own, around, of_tile, accident, found);
+                    found.iter().for_each(|&light| met.add(light, of_tile));
+                }
                 continue;
             }
-            for (x, (&a, &b)) in excess_a.iter().zip(&excess_b).enumerate() {
+            for x in 0..tile.width {
                 let pixel = y * grid.width() + tile.x + x;
                 let samples = HalfSamples::new(film.pixel_counts(tile.index, pixel));
-                met.add(light_found([a, b], samples, accident), samples);
+                let [[a, b], [around_a, around_b]] = [own, around].map(|rows| rows.map(|row| row[x]));
+                met.add(light_found([a - around_b, b - around_a], samples, accident), samples);
             }
         }
         met
@@ -211,17 +220,6 @@ fn highest_of_nine([above, here, below]: [&[f32]; 3], columns: &mut [f32], highe
     }
 }
 
-/// What each half has more at a pixel than the other around it.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-fn excesses([a, b]: [&[f32]; 2], [around_a, around_b]: [&[f32]; 2], [of_a, of_b]: [&mut [f32]; 2]) {
-    let n = of_a.len();
-    let (a, b, around_a, around_b, of_b) = (&a[..n], &b[..n], &around_a[..n], &around_b[..n], &mut of_b[..n]);
-    for x in 0..n {
-        of_a[x] = a[x] - around_b[x];
-        of_b[x] = b[x] - around_a[x];
-    }
-}
-
 /// Light in the mean of all samples of a pixel, by what each half has more than the other around it; none if one sample of
 /// it is an accident.
 #[inline(always)]
@@ -235,13 +233,19 @@ fn light_found([a, b]: [f32; 2], samples: HalfSamples, accident: f32) -> f64 {
     if is_light { light } else { 0.0 }
 }
 
-/// [`light_found`] at the pixels of a row.
+/// [`light_found`] at the pixels of a row, by what the halves have there and around.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-fn found_row([a, b]: [&[f32]; 2], samples: HalfSamples, accident: f32, found: &mut [f64]) {
+fn found_row(
+    [a, b]: [&[f32]; 2],
+    [around_a, around_b]: [&[f32]; 2],
+    samples: HalfSamples,
+    accident: f32,
+    found: &mut [f64],
+) {
     let n = found.len();
-    let (a, b) = (&a[..n], &b[..n]);
+    let (a, b, around_a, around_b) = (&a[..n], &b[..n], &around_a[..n], &around_b[..n]);
     for x in 0..n {
-        found[x] = light_found([a[x], b[x]], samples, accident);
+        found[x] = light_found([a[x] - around_b[x], b[x] - around_a[x]], samples, accident);
     }
 }
 
