@@ -331,6 +331,7 @@ impl Eyes {
             // Replaced it could be even so; whoever has made it read-only did not want that
             OpenOptions::new().write(true).open(&target).map_err(io)?;
         }
+        #[cfg_attr(not(unix), expect(unused_mut))]
         let mut file = tempfile::Builder::new();
         let permissions = there.then(|| std::fs::metadata(&target)).transpose().map_err(io)?;
         #[cfg(unix)]

@@ -319,21 +319,23 @@ class Wavefront:
         def begins(sizes):
             return np.cumsum(sizes) - sizes
 
-        def column(values, kind=mi.UInt32):
-            return kind(np.array(values, np.uint64 if kind is mi.UInt64 else np.uint32))
+        # One array, whose numbers of a piece lie side by side: of many arrays, Dr.Jit makes a new kernel for each order that they
+        # come in, and keeps them all
+        columns = {name: [tiles[number][name] for number in numbers] for name in ("x", "y", "width", "samples", "point", "sequence")}
+        columns |= {"run": [runs[number] for number in numbers], "lanes": lanes_of, "start": starts}
+        columns |= {"first_lane": begins(counts * lanes_of), "first_pixel": begins(counts)}
+        names = list(columns)
+        table = mi.UInt64(np.stack([np.asarray(columns[name], np.uint64) for name in names], axis=1).ravel())
 
-        table = {name: column([tiles[number][name] for number in numbers]) for name in ("x", "y", "width", "samples")}
-        for name in ("point", "sequence"):
-            table[name] = column([tiles[number][name] for number in numbers], mi.UInt64)
-        table |= {"run": column([runs[number] for number in numbers]), "lanes": column(lanes_of), "start": column(starts)}
-        table |= {"first_lane": column(begins(counts * lanes_of)), "first_pixel": column(begins(counts))}
+        def of(name, piece, kind=mi.UInt32):
+            return kind(dr.gather(mi.UInt64, table, piece * len(names) + names.index(name)))
 
-        def of(name, piece):
-            return dr.gather(type(table[name]), table[name], piece)
+        def pieces_of(sizes):
+            return mi.UInt32(np.repeat(np.arange(len(pieces), dtype=np.uint32), sizes))
 
         # Only the piece is known of a lane here; whatever follows from it is worked out where the samples are taken. The
         # processor's last vector may reach past the last lane, where a gather gives 0, and dividing by that is a fault
-        piece = column(np.repeat(np.arange(len(pieces)), counts * lanes_of))
+        piece = pieces_of(counts * lanes_of)
         lane = dr.arange(mi.UInt32, dr.width(piece)) - of("first_lane", piece)
         each, width, run = dr.maximum(of("lanes", piece), 1), dr.maximum(of("width", piece), 1), of("run", piece)
         place = lane // each
@@ -343,8 +345,8 @@ class Wavefront:
         row = place // width
         x, y = of("x", piece) + place - row * width, of("y", piece) + row
         pixel = mix(mi.UInt64(y) << 32 | mi.UInt64(x), mi.UInt64)
-        key = mix(pixel ^ dr.opaque(mi.UInt64, self.seed), mi.UInt64) + of("sequence", piece) * mi.UInt64(GOLDEN)
-        key, index = mix(key, mi.UInt64), of("point", piece) + mi.UInt64(begin)
+        key = mix(pixel ^ dr.opaque(mi.UInt64, self.seed), mi.UInt64) + of("sequence", piece, mi.UInt64) * mi.UInt64(GOLDEN)
+        key, index = mix(key, mi.UInt64), of("point", piece, mi.UInt64) + mi.UInt64(begin)
 
         def one_more(done, sum):
             self.seed_points(key, index + mi.UInt64(done))
@@ -357,7 +359,7 @@ class Wavefront:
         dr.eval(sum)
 
         # Lanes of a pixel one after the other, whatever runs them
-        piece = column(np.repeat(np.arange(len(pieces)), counts))
+        piece = pieces_of(counts)
         each, samples = of("lanes", piece), mi.Float64(of("samples", piece))
         first = of("first_lane", piece) + (dr.arange(mi.UInt32, dr.width(piece)) - of("first_pixel", piece)) * each
 
