@@ -140,7 +140,8 @@ impl Spread {
     ///
     /// What a person misses or sees is the same person's in all places, and a scene is the same scene: that part of
     /// both spreads is common to all places, the rest is independent in each. Integrated over the common part by the
-    /// midpoint rule.
+    /// midpoint rule. Tiles smaller than a place stand for less than one; but whoever sees noise in a tile sees it in the picture,
+    /// so that the share is at most that of the worst.
     pub fn share_in_picture(&self, places: impl Iterator<Item = (f32, f64)> + Clone) -> f64 {
         let by_person = self.people.min(Self::PEOPLE_BY_PLACE);
         let local = (Self::SCENES_BY_PLACE * self.scenes * self.scenes + by_person * by_person).sqrt();
@@ -154,7 +155,8 @@ impl Spread {
             };
             places.clone().map(sees_none).sum::<f64>().exp()
         };
-        (0..STEPS).map(at).sum::<f64>() / STEPS as f64
+        let worst = places.clone().map(|(share, _)| f64::from(share)).fold(1.0, f64::min);
+        ((0..STEPS).map(at).sum::<f64>() / STEPS as f64).min(worst)
     }
 
     /// How many of the places in which people looked a tile stands for: they looked at zones of 128 to 200 pixels
@@ -212,6 +214,18 @@ mod tests {
             let spread = Spread { scenes, people: 0.5 };
             let log_odds = needed.ln() / scenes * std::f64::consts::PI / 3f64.sqrt();
             assert!((spread.share(log_odds) - 0.95).abs() < 0.002, "{scenes}: {}", spread.share(log_odds));
+        }
+    }
+
+    /// A lone noisy tile of 32 pixels is a 26th of a place.
+    #[test]
+    fn a_picture_is_seen_no_better_than_its_worst_tile() {
+        let spread = Spread { scenes: 0.4, people: 0.5 };
+        let tile = Spread::places(32 * 32, 37.8);
+        for worst in [0.1f32, 0.5, 0.9] {
+            let share = spread.share_in_picture([(worst, tile), (0.999, 20.0 * tile)].into_iter());
+            assert!(share <= f64::from(worst), "{worst}: {share}");
+            assert_eq!(spread.share_in_picture([(worst, tile)].into_iter()), f64::from(worst));
         }
     }
 
