@@ -656,7 +656,8 @@ class Addon(unittest.TestCase):
 
     def test_a_region_is_a_part_of_the_frame(self):
         scene = room()
-        scene.noisefloor.max_samples = 96
+        # A part that is judged by itself may take more samples than the whole; not beyond the first verdict
+        scene.noisefloor.max_samples = 64
         whole = rendered(scene)[0]
         render = scene.render
         render.use_border = render.use_crop_to_border = True
@@ -850,7 +851,7 @@ class Addon(unittest.TestCase):
         self.assertIn("at 24 frames a second", hooks.state.summary)
         self.assertGreater(scene.cycles.adaptive_threshold, found)
 
-    def test_crops_stand_for_a_large_picture_between_two_looks_at_the_whole(self):
+    def test_crops_stand_for_a_large_picture_between_looks_at_the_whole(self):
         scene = room(closed=True)
         scene.cycles.samples, scene.noisefloor.people = 4096, 0.5
         scene.render.resolution_x, scene.render.resolution_y = 256, 200
@@ -867,7 +868,9 @@ class Addon(unittest.TestCase):
         finally:
             bpy.app.handlers.render_pre.remove(record)
         widths = [wide for wide, _ in seen]
-        self.assertEqual((widths[:2], set(widths[2:-2]), widths[-2:]), ([256] * 2, {128}, [256] * 2))
+        # The whole has the first and the last word; where it is not satisfied with what was found in crops, it has one between
+        self.assertEqual((widths[:2], set(widths), widths[-2:]), ([256] * 2, {128, 256}, [256] * 2))
+        self.assertLessEqual(widths.count(256), 6)
         self.assertTrue(all(persistent for _, persistent in seen))
         after = facts(scene)
         changed = {key for key in before if before[key] != after[key]}
