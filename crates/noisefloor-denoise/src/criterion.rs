@@ -293,7 +293,9 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
                 *verdict = verdict.expecting(Some(spp));
             }
         }
-        let others = grid.tiles().filter(|tile| !tiles.iter().any(|asked| asked.index == tile.index));
+        let mut asked = vec![false; grid.len()];
+        tiles.iter().for_each(|tile| asked[tile.index] = true);
+        let others = grid.tiles().filter(|tile| !asked[tile.index]);
         self.revised.extend(others.filter_map(|tile| {
             let (spp, done) = (together[tile.index]?, self.done[tile.index]?);
             Some((tile, Verdict::new(false).with_loss(done.lost, done.undenoised).expecting(Some(spp))))
