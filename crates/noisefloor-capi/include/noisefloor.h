@@ -512,6 +512,13 @@ NfStatus nf_background_push_image(const NfBackground *background,
                                   size_t floats,
                                   size_t channels);
 
+// As nf_background_push_image, for a renderer that keeps running means: the mean of all total samples per pixel so far.
+NfStatus nf_background_push_running_image(const NfBackground *background,
+                                          uint64_t total,
+                                          const float *image,
+                                          size_t floats,
+                                          size_t channels);
+
 // Adds a batch of one tile to the pass: as nf_session_push, later.
 NfStatus nf_background_push(const NfBackground *background,
                             size_t tile,

@@ -67,6 +67,33 @@ fn lent(background: *const NfBackground) -> Result<Arc<NfBackground>, Failure> {
     handle::get(background)
 }
 
+/// A copy of an image whose pixels have this many channels.
+///
+/// # Safety
+/// As of [`border::array`].
+unsafe fn copied(
+    lent: &NfBackground,
+    image: *const f32,
+    floats: usize,
+    channels: usize,
+) -> Result<Vec<Rgb>, Failure> {
+    border::channels(channels)?;
+    let grid = lent.session.grid;
+    let wanted = channels * grid.width() * grid.height();
+    // SAFETY: promised by the caller.
+    let image = unsafe { border::array(image, floats, wanted, "image") }?;
+    border::memory(grid, size_of::<Rgb>())?;
+    let mut pixels = lent.background.buffer();
+    if channels == 3 {
+        pixels.copy_from_slice(image.as_chunks().0);
+    } else {
+        for (pixel, of_image) in pixels.iter_mut().zip(image.chunks_exact(channels)) {
+            *pixel = [of_image[0], of_image[1], of_image[2]];
+        }
+    }
+    Ok(pixels)
+}
+
 /// Lets a session judge in the background, on a thread of its own. At most `waiting` passes, and at least one, wait
 /// behind the one that is being judged; when_full is NF_FULL_WAIT or NF_FULL_MERGE. Until nf_background_end gives the
 /// session back, calls on it are NF_STATUS_ARGUMENT, but for nf_session_tile_count, nf_session_tile and
@@ -111,21 +138,26 @@ pub unsafe extern "C" fn nf_background_push_image(
 ) -> NfStatus {
     guard(|| {
         let lent = lent(background)?;
-        border::channels(channels)?;
-        let grid = lent.session.grid;
-        let wanted = channels * grid.width() * grid.height();
         // SAFETY: promised by the caller.
-        let image = unsafe { border::array(image, floats, wanted, "image") }?;
-        border::memory(grid, size_of::<Rgb>())?;
-        let mut pixels = lent.background.buffer();
-        if channels == 3 {
-            pixels.copy_from_slice(image.as_chunks().0);
-        } else {
-            for (pixel, of_image) in pixels.iter_mut().zip(image.chunks_exact(channels)) {
-                *pixel = [of_image[0], of_image[1], of_image[2]];
-            }
-        }
+        let pixels = unsafe { copied(&lent, image, floats, channels) }?;
         Ok(lent.background.push_image(spp, pixels)?)
+    })
+}
+
+/// As nf_background_push_image, for a renderer that keeps running means: the mean of all total samples per pixel so far.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn nf_background_push_running_image(
+    background: *const NfBackground,
+    total: u64,
+    image: *const f32,
+    floats: usize,
+    channels: usize,
+) -> NfStatus {
+    guard(|| {
+        let lent = lent(background)?;
+        // SAFETY: promised by the caller.
+        let pixels = unsafe { copied(&lent, image, floats, channels) }?;
+        Ok(lent.background.push_running_image(total, pixels)?)
     })
 }
 

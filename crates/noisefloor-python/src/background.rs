@@ -6,6 +6,7 @@ use crate::judging::{Criterion, not_while_denoising};
 use crate::pool;
 use crate::session::{PySession, warn};
 use crate::verdicts::{PyRequest, PyStop, TileLike};
+use noisefloor::Rgb;
 use noisefloor::background::{Background, News, WhenFull};
 use noisefloor::session::SessionError;
 use pyo3::prelude::*;
@@ -38,6 +39,14 @@ impl PyBackground {
         not_while_denoising()?;
         let elsewhere = || Error::new_err("the session judges in the process that this one was forked off");
         self.background.as_ref().filter(|_| self.process == process::id()).ok_or_else(elsewhere)
+    }
+
+    /// A copy of an image.
+    fn copied(&self, background: &Background<Criterion>, image: &Pixels<'_>) -> PyResult<Vec<Rgb>> {
+        let pixels = self.session.get().whole(image)?;
+        let mut buffer = background.buffer();
+        buffer.copy_from_slice(&pixels);
+        Ok(buffer)
     }
 
     fn raised(&self, error: SessionError) -> PyErr {
@@ -80,10 +89,21 @@ impl PyBackground {
     /// Raises SizeError if the shape is another, and what failed in the background.
     fn push_image(&self, #[pyo3(from_py_with = whole)] spp: u64, image: Pixels<'_>) -> PyResult<()> {
         let background = self.here()?;
-        let pixels = self.session.get().whole(&image)?;
-        let mut buffer = background.buffer();
-        buffer.copy_from_slice(&pixels);
+        let buffer = self.copied(background, &image)?;
         background.push_image(spp, buffer).map_err(|error| self.raised(error))
+    }
+
+    /// As push_image, for a renderer that keeps running means: the mean of all total samples per pixel so far.
+    ///
+    /// Raises SizeError if the shape is another, and what failed in the background.
+    fn push_running_image(
+        &self,
+        #[pyo3(from_py_with = whole)] total: u64,
+        image: Pixels<'_>,
+    ) -> PyResult<()> {
+        let background = self.here()?;
+        let buffer = self.copied(background, &image)?;
+        background.push_running_image(total, buffer).map_err(|error| self.raised(error))
     }
 
     /// Adds the mean of spp new samples per pixel of a tile (a Tile or its number) to the pass. It is copied.

@@ -289,6 +289,27 @@ class Backgrounds(unittest.TestCase):
         with self.assertRaisesRegex(nf.Error, "given back"):
             background.judge()
 
+    def test_running_means_are_those_of_a_session_that_waits(self):
+        plain, session = [nf.Session(96, 80, params=PARAMS, linear=True) for _ in range(2)]
+        with nf.Background(session) as background:
+            for total, mean in self.running(26):
+                plain.push_running_image(total, mean)
+                plain.judge()
+                background.push_running_image(total, mean)
+                background.judge()
+                mean[:] = np.nan  # it was copied
+        self.assertTrue(plain.done)
+        self.assertEqual(stops(session), stops(plain))
+        self.assertTrue((session.spp() == 26 * 16).all())
+        with self.assertRaises(nf.Error):
+            background.push_running_image(1000, np.zeros((80, 96, 3), np.float32))
+
+    def running(self, count):
+        total = 0
+        for k, image in enumerate(self.passes(count), 1):
+            total = total + image.astype(np.float64)
+            yield 16 * k, (total / k).astype(np.float32)
+
     def test_it_ends_with_its_block(self):
         session = nf.Session(96, 80, params=PARAMS)
         with nf.Background(session, when_full="merge") as background:

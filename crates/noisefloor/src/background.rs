@@ -90,6 +90,9 @@ struct Judged<C> {
     session: Option<Session<C>>,
     /// Samples of tiles that had stopped.
     late: Option<Film>,
+    /// The last running mean and its samples per pixel, for those of tiles that had stopped. It has all samples, so that a
+    /// tile that is opened again gets them with the next one.
+    running: Option<(u64, Vec<Rgb>)>,
 }
 
 #[derive(Default)]
@@ -116,10 +119,19 @@ const SPENT: usize = 2;
 type Pass = Vec<Push>;
 
 struct Push {
-    /// The whole image, if none.
-    tile: Option<usize>,
+    of: Of,
+    /// New samples per pixel; of a running mean all of them.
     spp: u64,
     mean: Vec<Rgb>,
+}
+
+/// What a batch is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Of {
+    Tile(usize),
+    Image,
+    /// A running mean of the image.
+    Running,
 }
 
 impl<C: StoppingCriterion + Send + 'static> Background<C> {
@@ -147,7 +159,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         let grid = session.film().grid();
         let (requests, next_pass) = (session.requests(), session.next_pass());
         let shared = Arc::new(Shared {
-            judged: Mutex::new(Judged { session: Some(session), late: None }),
+            judged: Mutex::new(Judged { session: Some(session), late: None, running: None }),
             state: Mutex::new(State { requests, next_pass, ..State::default() }),
             changed: Condvar::new(),
         });
@@ -168,11 +180,23 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// # Errors
     /// [`SessionError::Image`] if its size is not the image's, and what failed in the background.
     pub fn push_image(&self, spp: u64, image: Vec<Rgb>) -> Result<(), SessionError> {
-        let expected = self.grid.width() * self.grid.height();
-        if image.len() != expected {
-            return Err(SessionError::Image { got: image.len(), expected });
-        }
-        self.add(Push { tile: None, spp, mean: image })
+        self.check_image(&image)?;
+        self.add(Push { of: Of::Image, spp, mean: image })
+    }
+
+    fn check_image(&self, image: &[Rgb]) -> Result<(), SessionError> {
+        let (got, expected) = (image.len(), self.grid.width() * self.grid.height());
+        if got == expected { Ok(()) } else { Err(SessionError::Image { got, expected }) }
+    }
+
+    /// As [`Session::push_running_image`], later: the mean of all `total` samples per pixel so far. Tiles that are done by
+    /// then have the samples at the end. Of passes that become one ([`WhenFull::Merge`]), the later one has all samples.
+    ///
+    /// # Errors
+    /// As of [`Background::push_image`].
+    pub fn push_running_image(&self, total: u64, image: Vec<Rgb>) -> Result<(), SessionError> {
+        self.check_image(&image)?;
+        self.add(Push { of: Of::Running, spp: total, mean: image })
     }
 
     /// As [`Session::push`], later. A tile that is done by then has the samples at the end.
@@ -187,7 +211,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         if got != expected {
             return Err(FilmError::Pixels { tile, got, expected }.into());
         }
-        self.add(Push { tile: Some(tile), spp, mean })
+        self.add(Push { of: Of::Tile(tile), spp, mean })
     }
 
     fn add(&self, push: Push) -> Result<(), SessionError> {
@@ -298,13 +322,16 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         drop(self.finish());
         self.end();
         let mut judged = self.shared.judged.lock().map_err(|_| self.shared.failure())?;
-        let (session, late) = (judged.session.take(), judged.late.take());
+        let (session, late, running) = (judged.session.take(), judged.late.take(), judged.running.take());
         let gone = || SessionError::Background("the session was given back".into());
         let mut session = session.ok_or_else(gone)?;
         self.shared.state().failed.get_or_insert_with(gone);
         self.shared.changed.notify_all();
         if let Some(late) = late {
             session.add_late(&late)?;
+        }
+        if let Some((total, image)) = running {
+            session.add_late_running(total, &image)?;
         }
         Ok(session)
     }
@@ -356,13 +383,13 @@ impl<C: StoppingCriterion + Send> Shared<C> {
     fn work(&self, run: impl Fn(&mut (dyn FnMut() + Send))) {
         loop {
             let mut state = self.wait_while(self.state(), |state| state.waiting.is_empty() && !state.ending);
-            let Some(pass) = state.waiting.pop_front() else { return };
+            let Some(mut pass) = state.waiting.pop_front() else { return };
             state.busy = true;
             drop(state);
             self.changed.notify_all();
 
             let mut found = None;
-            let judged = catch_unwind(AssertUnwindSafe(|| run(&mut || found = Some(self.take(&pass)))));
+            let judged = catch_unwind(AssertUnwindSafe(|| run(&mut || found = Some(self.take(&mut pass)))));
             let nothing = || Err(SessionError::Background("its work was not done where it was sent".into()));
             let found = match judged {
                 Ok(()) => found.unwrap_or_else(nothing),
@@ -373,7 +400,9 @@ impl<C: StoppingCriterion + Send> Shared<C> {
 
             let mut state = self.state();
             state.busy = false;
-            state.keep(pass.into_iter().filter(|push| push.tile.is_none()).map(|push| push.mean));
+            let images =
+                pass.into_iter().filter(|push| !matches!(push.of, Of::Tile(_)) && !push.mean.is_empty());
+            state.keep(images.map(|push| push.mean));
             match found {
                 Ok(Found { stops, warnings, requests, next_pass }) => {
                     (state.requests, state.next_pass) = (requests, next_pass);
@@ -393,23 +422,29 @@ impl<C: StoppingCriterion + Send> Shared<C> {
     }
 
     /// Pushes a pass, and judges.
-    fn take(&self, pass: &[Push]) -> Result<Found, SessionError> {
+    fn take(&self, pass: &mut Pass) -> Result<Found, SessionError> {
         let Ok(mut judged) = self.judged.lock() else { return Err(self.failure()) };
-        let Judged { session: Some(session), late } = &mut *judged else { return Err(self.failure()) };
+        let Judged { session: Some(session), late, running } = &mut *judged else {
+            return Err(self.failure());
+        };
         let grid = session.film().grid();
-        for Push { tile, spp, mean } in pass {
-            let tiles: Vec<Tile> = match *tile {
-                Some(tile) => vec![grid.tile(tile)],
-                None => grid.tiles().collect(),
+        for Push { of, spp, mean } in pass {
+            let tiles: Vec<Tile> = match *of {
+                Of::Tile(tile) => vec![grid.tile(tile)],
+                Of::Image | Of::Running => grid.tiles().collect(),
             };
-            let pixels = |place: Tile| match tile {
-                Some(_) => TilePixels::alone(place, mean),
-                None => TilePixels::in_image(place, mean, grid.width()),
+            let pixels = |place: Tile| match of {
+                Of::Tile(_) => TilePixels::alone(place, mean),
+                Of::Image | Of::Running => TilePixels::in_image(place, mean, grid.width()),
             };
             let (open, done): (Vec<Tile>, Vec<Tile>) =
                 tiles.into_iter().partition(|tile| session.is_open(tile.index));
-            session.push_tiles(*spp, &open, pixels)?;
-            if !done.is_empty() {
+            if *of == Of::Running {
+                session.push_running_tiles(*spp, &open, mean)?;
+                let before = running.replace((*spp, std::mem::take(mean)));
+                *mean = before.map_or_else(Vec::new, |(_, image)| image);
+            } else {
+                session.push_tiles(*spp, &open, pixels)?;
                 add_late(late, grid, *spp, &done, pixels)?;
             }
         }
@@ -434,6 +469,9 @@ fn add_late<'a>(
     tiles: &[Tile],
     pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
 ) -> Result<(), FilmError> {
+    if tiles.is_empty() {
+        return Ok(());
+    }
     if late.is_none() {
         Film::check_memory(grid, 1)?;
     }
@@ -453,16 +491,25 @@ impl State {
 
 /// Adds a pass to another one, and returns the images that are of no use then.
 fn merge(before: &mut Pass, pass: Pass) -> Vec<Vec<Rgb>> {
-    let mut places: HashMap<Option<usize>, VecDeque<usize>> = HashMap::new();
+    let mut places: HashMap<Of, VecDeque<usize>> = HashMap::new();
     for (place, push) in before.iter().enumerate() {
-        places.entry(push.tile).or_default().push_back(place);
+        places.entry(push.of).or_default().push_back(place);
     }
     let mut spent = Vec::new();
     for push in pass {
-        let place = places.get_mut(&push.tile).and_then(VecDeque::pop_front);
+        let place = places.get_mut(&push.of).and_then(VecDeque::pop_front);
         match place.map(|place| &mut before[place]) {
             // A batch without samples stays one: pushing it is an error
             Some(other) if other.spp > 0 && push.spp > 0 => {
+                if push.of == Of::Running {
+                    // It has the samples of the one before in it; one with fewer is an error
+                    if push.spp > other.spp {
+                        spent.push(std::mem::replace(other, push).mean);
+                    } else {
+                        before.push(push);
+                    }
+                    continue;
+                }
                 let spp = other.spp.saturating_add(push.spp);
                 let weight = push.spp as f64 / spp as f64;
                 let numbers = other.mean.as_flattened_mut().iter_mut().zip(push.mean.as_flattened());
@@ -471,7 +518,7 @@ fn merge(before: &mut Pass, pass: Pass) -> Vec<Vec<Rgb>> {
                     *mean = (old + (f64::from(new) - old) * weight) as f32;
                 });
                 other.spp = spp;
-                if push.tile.is_none() {
+                if push.of == Of::Image {
                     spent.push(push.mean);
                 }
             }

@@ -384,32 +384,28 @@ impl Film {
     /// # Errors
     /// [`FilmError`] as [`Film::add`], and if `total` is not above the samples that the film has.
     pub fn add_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
-        let (new, batch) = self.new_of_running(tile, total, mean)?;
+        let place = self.check(tile, mean.len())?;
+        let (new, batch) = self.new_of_running(place, total, TilePixels::alone(place, mean))?;
         self.add(tile, new, &batch)
     }
 
-    /// The number of new samples in a running mean, and their mean.
+    /// The number of new samples in a running mean of a tile, and their mean.
     pub(crate) fn new_of_running(
         &self,
-        tile: usize,
+        tile: Tile,
         total: u64,
-        mean: &[Rgb],
+        mean: TilePixels<'_>,
     ) -> Result<(u64, Vec<Rgb>), FilmError> {
-        let checked = self.check(tile, mean.len())?;
-        let had = self.spp(tile);
+        let had = self.spp(tile.index);
         let new = total.checked_sub(had).filter(|&n| n > 0);
-        let Some(new) = new else { return Err(FilmError::NothingNew { tile, had, now: total }) };
+        let Some(new) = new else { return Err(FilmError::NothingNew { tile: tile.index, had, now: total }) };
         let (before, after) = (had as f64 / new as f64, total as f64 / new as f64);
-        let mut batch = Vec::with_capacity(mean.len());
-        for (row, values) in checked.rows(self.grid.width()).zip(mean.chunks_exact(checked.width)) {
-            for (pixel, value) in row.zip(values) {
-                let old = self.pixel(tile, pixel);
-                batch.push(std::array::from_fn(|c| {
-                    (f64::from(value[c]) * after - f64::from(old[c]) * before) as f32
-                }));
-            }
-        }
-        Ok((new, batch))
+        let pixels = tile.rows(self.grid.width()).flatten().zip(mean.iter());
+        let new_of = |(pixel, value): (usize, Rgb)| -> Rgb {
+            let old = self.pixel(tile.index, pixel);
+            std::array::from_fn(|c| (f64::from(value[c]) * after - f64::from(old[c]) * before) as f32)
+        };
+        Ok((new, pixels.map(new_of).collect()))
     }
 
     pub(crate) fn check(&self, tile: usize, pixels: usize) -> Result<Tile, FilmError> {

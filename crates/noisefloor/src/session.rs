@@ -341,13 +341,27 @@ impl<C: StoppingCriterion> Session<C> {
         Ok(())
     }
 
+    /// The same, of a running mean of the whole image.
+    pub(crate) fn add_late_running(&mut self, total: u64, image: &[Rgb]) -> Result<(), FilmError> {
+        let grid = self.film.grid();
+        for tile in grid.tiles() {
+            if !self.is_open(tile.index) && self.film.spp(tile.index) < total {
+                let mean = TilePixels::in_image(tile, image, grid.width());
+                let (new, batch) = self.film.new_of_running(tile, total, mean)?;
+                self.film.add(tile.index, new, &batch)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Adds the new samples in a running mean of a tile; see [`Film::add_running`].
     ///
     /// # Errors
     /// As of [`Session::push`].
     pub fn push_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), SessionError> {
-        let (new, batch) = self.film.new_of_running(tile, total, mean)?;
-        let (place, pixels) = (self.film.grid().tile(tile), |tile| TilePixels::alone(tile, &batch));
+        let place = self.film.check(tile, mean.len())?;
+        let (new, batch) = self.film.new_of_running(place, total, TilePixels::alone(place, mean))?;
+        let pixels = |tile| TilePixels::alone(tile, &batch);
         self.push_given(new, &[place], &pixels, &|tile| TilePixels::alone(tile, mean))?;
         self.watch.see_running();
         Ok(())
@@ -359,15 +373,41 @@ impl<C: StoppingCriterion> Session<C> {
     /// # Errors
     /// As of [`Session::push_image`] and [`Session::push_running`]: tiles before the one that is refused have the samples then.
     pub fn push_running_image(&mut self, total: u64, image: &[Rgb]) -> Result<(), SessionError> {
-        let (width, expected) = (self.film.width(), self.film.width() * self.film.height());
+        let grid = self.film.grid();
+        let expected = grid.width() * grid.height();
         if image.len() != expected {
             return Err(SessionError::Image { got: image.len(), expected });
         }
-        for tile in
-            self.film.grid().tiles().filter(|tile| self.tiles[tile.index].stop.is_none()).collect::<Vec<_>>()
-        {
-            let mean: Vec<Rgb> = tile.rows(width).flat_map(|row| &image[row]).copied().collect();
-            self.push_running(tile.index, total, &mean)?;
+        let open: Vec<Tile> = grid.tiles().filter(|tile| self.is_open(tile.index)).collect();
+        self.push_running_tiles(total, &open, image)
+    }
+
+    /// As [`Session::push_running_image`], to these tiles, in the order of the grid.
+    pub(crate) fn push_running_tiles(
+        &mut self,
+        total: u64,
+        tiles: &[Tile],
+        image: &[Rgb],
+    ) -> Result<(), SessionError> {
+        let (film, width) = (&self.film, self.film.width());
+        let new_of =
+            |tile: &Tile| film.new_of_running(*tile, total, TilePixels::in_image(*tile, image, width));
+        let new: Vec<_> = tiles.par_iter().map(new_of).collect();
+        // Nearly always, all tiles have as many: they are pushed at once then
+        let mut rest = tiles.iter().zip(new).peekable();
+        while let Some((first, new)) = rest.next() {
+            let (spp, batch) = new?;
+            let (mut alike, mut batches) = (vec![*first], vec![batch]);
+            while let Some((tile, Ok((_, batch)))) =
+                rest.next_if(|(_, new)| matches!(new, Ok((n, _)) if *n == spp))
+            {
+                alike.push(*tile);
+                batches.push(batch);
+            }
+            let place = |tile: &Tile| alike.partition_point(|other| other.index < tile.index);
+            let pixels = |tile: Tile| TilePixels::alone(tile, &batches[place(&tile)]);
+            self.push_given(spp, &alike, &pixels, &|tile| TilePixels::in_image(tile, image, width))?;
+            self.watch.see_running();
         }
         Ok(())
     }

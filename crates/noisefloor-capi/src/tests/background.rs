@@ -103,6 +103,37 @@ fn stops_are_those_of_a_session_that_waits() {
 }
 
 #[test]
+fn running_means_are_those_of_a_session_that_waits() {
+    let (plain, session) = (session(&params()), session(&params()));
+    let background = begin(&session, 1, NF_FULL_WAIT);
+    let (mut total, mut sums) = (0, vec![0.0f64; 4 * PIXELS]);
+    for pass in 0..12 {
+        let spp = 8 + pass;
+        total += spp;
+        sums.iter_mut().zip(image(pass, spp, 4)).for_each(|(sum, mean)| *sum += spp as f64 * f64::from(mean));
+        let mean: Vec<f32> = sums.iter().map(|sum| (sum / total as f64) as f32).collect();
+        for request in requests(&plain) {
+            let rows = tile(request.tile).rows(WIDTH).flatten();
+            let of_tile: Vec<f32> = rows.flat_map(|pixel| mean[4 * pixel..][..3].to_vec()).collect();
+            let (index, floats) = (request.tile.index, of_tile.len());
+            // SAFETY: a living handle, and an array of the size given.
+            let status = unsafe { nf_session_push_running(plain.0, index, total, of_tile.as_ptr(), floats) };
+            assert_eq!(status, NfStatus::Ok, "{}", message());
+        }
+        // SAFETY: a living handle, and NULL where it is allowed.
+        assert_eq!(unsafe { nf_session_judge(plain.0, null_mut()) }, NfStatus::Ok, "{}", message());
+        // SAFETY: an array of the size given.
+        let status =
+            unsafe { nf_background_push_running_image(background, total, mean.as_ptr(), mean.len(), 4) };
+        assert_eq!(status, NfStatus::Ok, "{}", message());
+        assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
+    }
+    assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
+    assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
+    assert_eq!(states(&session), states(&plain));
+}
+
+#[test]
 fn faults_and_wrong_calls_are_said() {
     let session = session(&params());
     let mut background = null_mut();

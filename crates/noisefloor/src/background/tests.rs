@@ -126,6 +126,64 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    /// Running means of the picture do as those given to the session that waits, also where a tile is opened again that
+    /// had stopped; the picture is the last of them.
+    #[test]
+    fn running_means_do_as_in_the_session_that_waits(
+        width in 33usize..70,
+        height in 16usize..70,
+        places in 1usize..4,
+        seed in 0u64..1000,
+    ) {
+        let grid = TileGrid::new(width, height, 16).unwrap();
+        let (mut total, mut sums) = (0, vec![[0.0f64; 3]; width * height]);
+        let mut totals = Vec::new();
+        for Handed { spp, images, .. } in &passes(grid, seed, 14) {
+            for (spp, image) in spp.iter().zip(images) {
+                total += spp;
+                let all = sums.as_flattened_mut().iter_mut().zip(image.as_flattened());
+                all.for_each(|(sum, &mean)| *sum += *spp as f64 * f64::from(mean));
+            }
+            let mean = |sum: &[f64; 3]| sum.map(|sum| (sum / total as f64) as f32);
+            totals.push((total, sums.iter().map(mean).collect::<Vec<Rgb>>()));
+        }
+        let session = || {
+            let schedule = Schedule::Growing { step: 8 };
+            let params = Params::default().with_tile(16).with_schedule(schedule).with_max_spp(400);
+            Session::new(width, height, Reopens::default(), params).unwrap()
+        };
+        let mut plain = session();
+        let mut stops = Vec::new();
+        for (total, image) in &totals {
+            plain.push_running_image(*total, image).unwrap();
+            stops.extend(plain.judge().unwrap());
+        }
+        let background = Background::new(session(), places, WhenFull::Wait).unwrap();
+        for (total, image) in &totals {
+            let mut buffer = background.buffer();
+            buffer.copy_from_slice(image);
+            background.push_running_image(*total, buffer).unwrap();
+            background.judge().unwrap();
+        }
+        // Some are opened again
+        prop_assert!(stops.len() > grid.len());
+        prop_assert_eq!(&background.finish().unwrap().stops, &stops);
+        let session = background.into_session().unwrap();
+        prop_assert!(session.stops().eq(plain.stops()));
+        let (total, last) = totals.last().unwrap();
+        for tile in grid.tiles() {
+            prop_assert_eq!(session.film().spp(tile.index), *total);
+        }
+        for (of_film, last) in session.film().image().as_flattened().iter().zip(last.as_flattened()) {
+            // Roundings of f32, of which the last batch has that of the total times total/new ≤ 60
+            prop_assert!((of_film / last - 1.0).abs() < 1e-5, "{of_film} {last}");
+        }
+    }
+}
+
 #[test]
 fn a_session_that_was_given_back_goes_on() {
     let grid = TileGrid::new(48, 32, 16).unwrap();
@@ -142,6 +200,35 @@ fn a_session_that_was_given_back_goes_on() {
     hand_over(&background, &passes[4..]);
     background.finish().unwrap();
     assert!(background.look(saved).unwrap() == saved(&plain));
+}
+
+/// Converged after 60 samples, and the first tile after 150, with which all others are opened again, once.
+#[derive(Default)]
+struct Reopens {
+    calls: usize,
+    done: Vec<Tile>,
+}
+
+impl StoppingCriterion for Reopens {
+    fn name(&self) -> String {
+        "reopens".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        let enough = |tile: &Tile| view.film.spp(tile.index) >= if tile.index == 0 { 150 } else { 60 };
+        self.calls += usize::from(!self.done.is_empty());
+        self.done.extend(tiles.iter().copied().filter(|tile| tile.index > 0 && enough(tile)));
+        Ok(tiles.iter().map(|tile| Verdict::new(enough(tile))).collect())
+    }
+
+    fn revised(&mut self) -> Vec<(Tile, Verdict)> {
+        let all = if self.calls == 1 { std::mem::take(&mut self.done) } else { Vec::new() };
+        all.into_iter().map(|tile| (tile, Verdict::new(false).expecting(Some(120)))).collect()
+    }
 }
 
 /// Converged after 100 samples; `judge` is called at each verdict.
@@ -273,6 +360,28 @@ fn passes_that_find_no_room_are_added_to_the_last() {
     let mean = (0..9).map(|k| f64::from(k * (10 + k))).sum::<f64>() / 126.0;
     assert!((f64::from(film.pixel(0, 0)[0]) / mean - 1.0).abs() < 1e-6);
     assert!((f64::from(film.pixel(1, 16)[0]) / ((mean * 126.0 + 900.0) / 135.0) - 1.0).abs() < 1e-6);
+}
+
+/// The last of several running means has all samples.
+#[test]
+fn running_means_that_find_no_room_are_replaced_by_the_next() {
+    let (open, session) = gate();
+    let background = Background::new(session, 1, WhenFull::Merge).unwrap();
+    for k in 1..10 {
+        background.push_running_image(20 * k, vec![[k as f32; 3]; 32 * 16]).unwrap();
+        background.judge().unwrap();
+    }
+    open.store(true, Ordering::Release);
+    assert!((1..9).contains(&background.finish().unwrap().judged));
+    let session = background.into_session().unwrap();
+    assert_eq!([session.film().spp(0), session.film().spp(1)], [180, 180]);
+    assert!(session.film().image().iter().all(|pixel| (pixel[0] - 9.0).abs() < 1e-4));
+    let background = Background::new(of_calls(|| ()), 1, WhenFull::Wait).unwrap();
+    assert!(matches!(background.push_running_image(1, vec![]), Err(SessionError::Image { .. })));
+    background.push_running_image(16, vec![[0.5; 3]; 32 * 16]).unwrap();
+    background.push_running_image(16, vec![[0.5; 3]; 32 * 16]).unwrap();
+    background.judge().unwrap();
+    assert!(matches!(background.finish(), Err(SessionError::Film(FilmError::NothingNew { .. }))));
 }
 
 #[test]
