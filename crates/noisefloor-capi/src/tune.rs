@@ -224,7 +224,8 @@ pub unsafe extern "C" fn nf_excess_denoised(
         let wrong = |error: &dyn std::error::Error| Failure::new(NfStatus::Size, error.to_string());
         let compared = pair.compare(&params);
         let error = DenoisedError::new(&halves, compared.display()).map_err(|error| wrong(&error))?;
-        let found = error.excess(lost, &params.viewing).map_err(|error| wrong(&error))?.worst;
+        let film = pair.film(&params)?;
+        let found = error.excess(&film, lost, &params.viewing).map_err(|error| wrong(&error))?.worst;
         // SAFETY: promised by the caller.
         unsafe { write(excess, pair.tell_apart(found)) }
     })

@@ -6,6 +6,7 @@ use crate::guides::Guides;
 use crate::mirrored::DenoisePasses;
 use crate::parts::{holds, parts_around, whole, within};
 use crate::record::{DenoisedRecord, Done};
+use crate::unmet::unmet_error;
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
     criterion::{CriterionError, Needs, View},
@@ -402,8 +403,6 @@ fn judge_tile(
 
 /// Whether a tile is likely to lack light, on a plain field as bright as it is, that would lose more than `limit`; then the
 /// samples per pixel at which it does not, if these can be told.
-///
-/// Nothing but the film counts: what the denoiser makes of tiles that have stopped is not known after a resume.
 fn darkness(
     view: &View<'_>,
     unmet: &Unmet,
@@ -411,13 +410,8 @@ fn darkness(
     limit: f64,
     eyes: &mut Eyes<'_>,
 ) -> Option<Option<u64>> {
-    let (film, display) = (view.film, view.display);
-    let light = unmet.shown(film, display, tile)?;
-    let pixels = tile.rows(film.grid().width()).flatten().map(|pixel| film.pixel(tile.index, pixel));
-    let sum = pixels.fold([0.0; 3], |sum, pixel| std::array::from_fn(|c| sum[c] + f64::from(pixel[c])));
-    let field = display.luma(sum.map(|c| (c / tile.pixels() as f64) as f32));
-    let light = light.residual.inside(light.inner).collect();
-    let light = DenoisedError::of((tile.width, tile.height), vec![field; tile.pixels()], light, display);
+    let film = view.film;
+    let light = unmet_error(film, view.display, unmet, tile)?;
     (eyes.lost(&light, 1.0) > limit).then(|| eyes.needed(&light, limit, (film.spp(tile.index), UNMET_DECAY)))
 }
 

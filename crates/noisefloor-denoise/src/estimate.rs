@@ -28,7 +28,6 @@ use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::{DenoiseError, cut};
 use crate::parts::within;
 use crate::thin::thin_bias;
-use noisefloor::tune::{Excess, squares};
 use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes, internal::held};
 use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorkspace};
 use rayon::prelude::*;
@@ -73,16 +72,6 @@ pub struct DenoisedError {
     /// Of each pixel, for its brightness; empty where that is not in question.
     light: Vec<Light>,
     display: Display,
-}
-
-/// How far a denoised picture is from what it may have lost.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct DenoisedExcess {
-    /// In its worst square.
-    pub worst: Excess,
-    /// In each of its [`squares`]: what may be lost there, with the margin, over what is allowed.
-    pub squares: Vec<(Tile, f64)>,
 }
 
 /// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves, what a white
@@ -198,27 +187,6 @@ impl DenoisedError {
         self.part(tile).jods_lost_at(1.0, eyes, room)
     }
 
-    /// How far the worst of the picture's [`squares`] is from having lost `lost` JODs, with the margin of
-    /// [`ESTIMATE_ERRS_BY`]: where the ratio is 1, two thirds of that are estimated.
-    ///
-    /// # Errors
-    /// [`VisionError`] if the picture is larger than the vision model compares.
-    pub fn excess(&self, lost: f64, viewing: &Viewing) -> Result<DenoisedExcess, VisionError> {
-        let eyes = VisionModel::new(viewing);
-        let ratio = |room: &mut VisionWorkspace, square: Tile| {
-            let estimated = self.jods_lost(Tile { index: 0, ..square }, &eyes, room)?;
-            Ok((square, estimated * ESTIMATE_ERRS_BY / lost))
-        };
-        let all = squares(self.size).into_par_iter().map_init(VisionWorkspace::default, ratio);
-        let squares: Vec<(Tile, f64)> = all.collect::<Result<_, _>>()?;
-        let worst = squares.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-        let (ratio, place) = worst.map_or((0.0, None), |(square, ratio)| {
-            (*ratio, Some((square.x + square.width / 2, square.y + square.height / 2)))
-        });
-        let worst = Excess::new(ratio).at(place);
-        Ok(DenoisedExcess { worst, squares })
-    }
-
     /// The same of the whole, if the residual had `contrast` times its strength.
     pub(crate) fn jods_lost_at(
         &self,
@@ -238,6 +206,10 @@ impl DenoisedError {
     /// By how much the whole is brighter or darker than its samples, as displayed; 0 if noise explains that.
     pub(crate) fn shift(&self) -> f32 {
         shift(&self.light, &self.display)
+    }
+
+    pub(crate) fn display(&self) -> &Display {
+        &self.display
     }
 
     /// The same of another strength.

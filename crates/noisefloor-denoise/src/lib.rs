@@ -45,6 +45,7 @@ mod brightness;
 mod criterion;
 mod denoiser;
 mod estimate;
+mod excess;
 mod guides;
 mod mirrored;
 #[cfg(feature = "oidn")]
@@ -52,14 +53,17 @@ mod oidn;
 mod parts;
 mod record;
 mod thin;
+mod unmet;
 
 pub use criterion::{
     DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising, stops_err_by,
 };
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
-pub use estimate::{DenoisedError, DenoisedExcess, DenoisedHalves, ESTIMATE_ERRS_BY};
+pub use estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY};
+pub use excess::DenoisedExcess;
 pub use guides::{GuideError, Guides};
 pub use mirrored::{DenoisePasses, MirrorMean};
 #[cfg(feature = "oidn")]
 pub use oidn::{OIDN, Oidn};
 pub use record::{DenoisedRecord, compose};
+pub use unmet::jods_lost_unmet;

@@ -416,7 +416,8 @@ fn compare(
     let compared = pair.compare(params);
     let halves = DenoisedHalves { size, noisy: [&pictures[0], &pictures[1]], denoised: [&da, &db] };
     let error = DenoisedError::new(&halves, compared.display()).map_err(|error| failed(&error))?;
-    let found = error.excess(lost, &params.viewing).map_err(|error| failed(&error))?;
+    let film = pair.film(params).map_err(Raise::raise)?;
+    let found = error.excess(&film, lost, &params.viewing).map_err(|error| failed(&error))?;
     let DenoisedExcess { worst, squares, .. } = found;
     let excess = pair.tell_apart(worst);
     let left = Left::Denoised(Box::new(error.of_shape_alone()), params.viewing);

@@ -409,7 +409,7 @@ impl<'a> SnapshotPair<'a> {
     }
 
     /// A film of two pictures of linear light that share no samples; `None` if these are none.
-    fn film(&self, grid: TileGrid) -> Option<Film> {
+    pub fn film(&self, grid: TileGrid) -> Option<Film> {
         let halves = match &self.basis {
             _ if self.image.display_referred => return None,
             Basis::Reference | Basis::Other(Samples::Nested) => return None,

@@ -27,7 +27,7 @@ mod search;
 pub use search::{CROP, Look, Looked, Search, Viewer, crops_for, drive};
 
 use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
-use crate::film::blend_row;
+use crate::film::{Film, blend_row};
 use crate::oracle::Oracle;
 use crate::params::Params;
 use crate::rgb::Rgb;
@@ -339,6 +339,15 @@ impl PicturePair {
         SnapshotPair::of_halves(&self.mean, [one, other], &params.tone_mapping).seen_on(params.viewing)
     }
 
+    /// A film that has the two pictures as its halves.
+    ///
+    /// # Errors
+    /// [`TileError`] if there are no tiles of that edge.
+    pub fn film(&self, params: &Params) -> Result<Film, TileError> {
+        let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
+        Ok(film_of(self.halves.each_ref(), grid))
+    }
+
     /// How far the noise of the mean is from what the share of people asked for does not see, and the map of
     /// it, row-major, 1 where it is just that: as a session has it whose film has the two pictures as its halves, with
     /// the light that they are likely not to have met, and with more samples wanted where noise is not trusted yet. What
@@ -348,10 +357,8 @@ impl PicturePair {
     /// [`PairError`], also if the pictures are no two of one view, or no light.
     pub fn noise(&self, oracle: &Oracle, params: &Params) -> Result<(Excess, Vec<f32>), PairError> {
         self.notice(params)?;
-        let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
-        let tiles: Vec<Tile> = grid.tiles().collect();
-        let [one, other] = &self.halves;
-        let (film, pair) = (film_of([one, other], grid), self.compare(params));
+        let (film, pair) = (self.film(params)?, self.compare(params));
+        let tiles: Vec<Tile> = film.grid().tiles().collect();
         let (display, viewing) = (pair.display(), params.viewing);
         let view = View { film: &film, display, viewing, audience: params.audience, reference: None };
         let verdicts = oracle.clone().judge(&view, &tiles)?;

@@ -160,6 +160,35 @@ fn denoised_pictures_made_elsewhere() {
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");
 
+    // What one picture alone has met, the other tiles may lack; a denoiser takes it for noise
+    let mut met = stripes(&mut random(1));
+    met[20 * 64 + 20] = [3e4; 3];
+    let (met_path, [a_again, b_again]) = (path("met.exr"), [&a, &b]);
+    write_exr(&met_path, &RenderLayers::rgb(64, 64, &met)).unwrap();
+    for [first, second] in [[&met_path, b_again], [a_again, &met_path]] {
+        let words = [
+            "judge",
+            first,
+            "--spp",
+            "8",
+            "--against",
+            second,
+            "--spp",
+            "8",
+            "--tile",
+            "32",
+            "--lost",
+            "0.2",
+        ];
+        let made = ["--independent", "--json", "--denoised", &good, &good2];
+        let json = succeed(&[&words[..], &made].concat());
+        let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let unmet: Vec<bool> =
+            report["tiles"].as_array().unwrap().iter().map(|tile| tile["unmet"] == true).collect();
+        assert_eq!(unmet[1..], [true; 3], "{json}");
+        assert!(report["converged_tiles"].as_u64().unwrap() <= 1, "{json}");
+    }
+
     let refuse = |more: &[&str], words: &[&str]| {
         let typed = judge(more);
         fail(&typed.iter().map(String::as_str).collect::<Vec<_>>(), words);

@@ -5,6 +5,7 @@
 mod criterion;
 /// The estimate, against truths that are known.
 mod estimate;
+mod excess;
 /// Albedo and normals of halves.
 mod guides;
 /// Synthetic scenes and simple denoisers.

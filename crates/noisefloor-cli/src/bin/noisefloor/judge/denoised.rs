@@ -8,7 +8,7 @@ use noisefloor::{
     stills::{SnapshotPair, Still},
 };
 use noisefloor_cli::say::{note, say, say_json};
-use noisefloor_denoise::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY};
+use noisefloor_denoise::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY, jods_lost_unmet};
 use noisefloor_image::maps::{Canvas, draw_field};
 use noisefloor_image::{ReadOptions, check_writable};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
@@ -44,6 +44,8 @@ struct Row {
     height: usize,
     jods_lost: f64,
     converged: bool,
+    /// Whether it is open for light alone that hardly any sample has met.
+    unmet: bool,
 }
 
 #[derive(Serialize)]
@@ -88,7 +90,9 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
     let size = a.size;
     let halves = DenoisedHalves { size, noisy: [&a.pixels, &b.pixels], denoised: [&da, &db] };
     let error = DenoisedError::new(&halves, pair.display())?;
-    let rows = judge(job, &error)?;
+    let film = pair.film(TileGrid::new(size.0, size.1, job.tile)?);
+    let unmet = film.map_or_else(Vec::new, |film| jods_lost_unmet(&film, pair.display(), &job.viewing));
+    let rows = judge(job, &error, &unmet)?;
     say_all(job, &rows)?;
     if let Some(path) = &job.noise_map {
         let shown: Vec<Rgb> = error.shown().iter().map(|&shown| [shown; 3]).collect();
@@ -107,14 +111,17 @@ fn denoised(path: &Path, of: &Still, viewing: &Viewing) -> anyhow::Result<Vec<Rg
     Ok(still.pixels)
 }
 
-fn judge(job: &DenoisedJob, error: &DenoisedError) -> anyhow::Result<Vec<Row>> {
+/// `unmet` has what each tile would lose by light that it is likely to lack, if the pictures tell.
+fn judge(job: &DenoisedJob, error: &DenoisedError, unmet: &[(Tile, f64)]) -> anyhow::Result<Vec<Row>> {
     let grid = TileGrid::new(error.size().0, error.size().1, job.tile)?;
     let (eyes, mut room) = (VisionModel::new(&job.viewing), VisionWorkspace::default());
     let mut row = |tile: Tile| {
         let jods_lost = error.jods_lost(tile, &eyes, &mut room)?;
         let Tile { index, x, y, width, height } = tile;
-        let converged = jods_lost * ESTIMATE_ERRS_BY <= job.lost;
-        Ok(Row { tile: index, x, y, width, height, jods_lost, converged })
+        let enough = jods_lost * ESTIMATE_ERRS_BY <= job.lost;
+        let lacking = unmet.get(index).is_some_and(|(_, lost)| *lost > job.lost);
+        let (converged, unmet) = (enough && !lacking, enough && lacking);
+        Ok(Row { tile: index, x, y, width, height, jods_lost, converged, unmet })
     };
     grid.tiles().map(&mut row).collect()
 }
@@ -131,8 +138,12 @@ fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
         });
     }
     say!("tile     x     y   size  JOD lost  verdict")?;
-    for Row { tile, x, y, width, height, jods_lost, converged } in rows {
-        let verdict = if *converged { "converged" } else { "error seen" };
+    for Row { tile, x, y, width, height, jods_lost, converged, unmet } in rows {
+        let verdict = match (converged, unmet) {
+            (true, _) => "converged",
+            (_, true) => "light?",
+            _ => "error seen",
+        };
         say!("{tile:4} {x:5} {y:5} {:>8} {jods_lost:8.3}  {verdict}", format!("{width}×{height}"))?;
     }
     say!(
@@ -141,5 +152,11 @@ fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
         job.lost,
         job.lost / ESTIMATE_ERRS_BY
     )?;
+    let missing = rows.iter().filter(|row| row.unmet).count();
+    if missing > 0 {
+        say!(
+            "{missing} would pass, but are likely to lack light that only one of the pictures has met, or neither: render more"
+        )?;
+    }
     Ok(say!("the limit is the vision model's: nobody has been asked about denoised tiles")?)
 }

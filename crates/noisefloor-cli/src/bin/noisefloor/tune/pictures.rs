@@ -373,7 +373,8 @@ impl<'a> Judges<'a> {
                 let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;
                 let error =
                     DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
-                let DenoisedExcess { worst, squares, .. } = error.excess(*lost, &params.viewing)?;
+                let film = halves.film(&params)?;
+                let DenoisedExcess { worst, squares, .. } = error.excess(&film, *lost, &params.viewing)?;
                 let map = error.map_of_jods_lost(&VisionModel::new(&params.viewing))?;
                 let excess = in_whole(halves.tell_apart(worst));
                 let denoised = Some(denoiser.denoise(&guided(&mean, 2))?);
