@@ -33,7 +33,10 @@ TOGETHER, STEP, MARGIN = 0.72, 1.2, 1.1
 BEFORE = 1.5
 # What verdicts count the mean of four as
 GAIN = 0.97
-COLUMNS = "estimate true noisy noise variance sum change dammertz relative".split()
+COLUMNS = "estimate true true_denoised noisy noise variance sum change dammertz relative cycles".split()
+# The constants that agree with people (criteria.md), and those that are tried
+PEOPLE = {"dammertz": 0.0046, "relative": 0.17, "cycles": 0.081}
+TRIED = np.exp(0.05 * np.arange(-30, 61))
 
 
 def load(folder, name, channels=3):
@@ -144,7 +147,7 @@ class Jods:
             for (left, top), edge in (((x, y), TILE), (square(x, y), SQUARE)):
                 reference = shown[top:top + edge, left:left + edge]
                 test = reference + field[top:top + edge, left:left + edge]
-                self.data.append(np.uint32(edge).tobytes() + test.astype("<f4").tobytes() + reference.astype("<f4").tobytes())
+                self.data.append(np.array([edge, edge], dtype="<u4").tobytes() + test.astype("<f4").tobytes() + reference.astype("<f4").tobytes())
                 self.keys.append((*key, tile))
 
     def answers(self):
@@ -155,23 +158,98 @@ class Jods:
         return found
 
 
-def plain_rules(folder, level, exposure):
-    """Dammertz et al.'s criterion, and the relative standard error, of each tile."""
-    a, b = (exposure * load(folder, f"{name}-{level:05}.f32") for name in "ab")
-    mean = 0.5 * (a + b)
-    rules = (np.abs(mean - a).sum(-1) / np.sqrt(np.maximum(mean.sum(-1), 1e-9)), np.abs(a - b).sum(-1) / 2 / np.maximum(mean.sum(-1), 1e-3))
-    return [rule.reshape(4, TILE, 4, TILE).mean((1, 3)).ravel() for rule in rules]
+def tiles_of(plane):
+    return plane.reshape(EDGE // TILE, TILE, EDGE // TILE, TILE).swapaxes(1, 2).reshape(len(TILES), -1)
+
+
+def near(plane, reduce):
+    """The least, or the largest, of each pixel and its eight neighbours."""
+    beside = np.pad(plane, 1, mode="edge")
+    rows = reduce.reduce([beside[:, i:i + EDGE] for i in range(3)])
+    return reduce.reduce([rows[i:i + EDGE] for i in range(3)])
+
+
+def plain_rules(folder, exposure):
+    """By level and tile: the mean error of Dammertz et al.'s criterion, without its factor for the area; the least constant for which 95 % of
+    the pixels have a small relative error, as in Mitsuba 0.6; and the least of those tried with which Cycles has stopped (noisefloor-rivals)."""
+    from scipy.stats import t as student
+
+    enough = int(np.ceil(0.95 * TILE * TILE)) - 1
+    found = {name: np.full((len(LEVELS), len(TILES)), np.inf) for name in PEOPLE}
+    constants = PEOPLE["cycles"] * TRIED
+    converged = np.zeros((len(constants), EDGE, EDGE), bool)
+    before, (samples, mean, squares, batches) = {"a": 0.0, "b": 0.0}, (0.0, 0.0, 0.0, 0)
+    for i, level in enumerate(LEVELS):
+        halves = {half: exposure * load(folder, f"{half}-{level:05}.f32") for half in "ab"}
+        both = 0.5 * (halves["a"] + halves["b"])
+        apart, light = 0.5 * np.abs(halves["a"] - halves["b"]).sum(-1), both.sum(-1)
+        found["dammertz"][i] = tiles_of(np.where(light > 0, apart / np.sqrt(np.maximum(light, 1e-30)), 0)).mean(1)
+
+        more = (level - (LEVELS[i - 1] if i else 0)) / 2
+        for half in "ab":
+            now = halves[half] @ LUMINANCE * level / 2
+            batch, before[half] = (now - before[half]) / more, now
+            samples, batches = samples + more, batches + 1
+            step = batch - mean
+            mean = mean + step * more / samples
+            squares = squares + step * (batch - mean) * more
+        width = student.ppf(0.975, batches - 1) * np.sqrt(squares / (batches - 1) / samples)
+        relative = width / np.maximum(mean, 0.01 * (both @ LUMINANCE).mean())
+        found["relative"][i] = np.sort(tiles_of(relative), axis=1)[:, enough]
+
+        light = np.maximum(light, 0)
+        error = apart / (1e-4 + np.where(light < 1, np.sqrt(light), light))
+        for constant, own in zip(constants, converged):
+            done = np.kron((found["cycles"][:i + 1].min(0) <= constant).reshape(EDGE // TILE, -1), np.ones((TILE, TILE), bool))
+            if done.all():
+                continue
+            if level >= np.ceil(16 / constant**0.3):
+                own |= error < constant
+            # What has not converged keeps its neighbours, unless its tile is done
+            own &= near(own | done, np.logical_and) | done
+            passed = np.sort(tiles_of(own), axis=1)[:, -enough - 1] & ~tiles_of(done).all(1)
+            found["cycles"][i, passed] = np.minimum(found["cycles"][i, passed], constant)
+    found["cycles"] = np.minimum.accumulate(found["cycles"])
+    return found
+
+
+def dammertz(errors, constant):
+    """Dammertz et al.'s criterion: the level at which each tile is done, of the mean errors of levels × rows × columns of tiles, as
+    noisefloor-rivals has it. A block of tiles is done when √(its share of the picture) times its error is small; else it is cut in two."""
+    count, rows, columns = errors.shape
+    levels = np.full((rows, columns), count)
+
+    def refine(level, top, bottom, left, right):
+        own = errors[level, top:bottom, left:right]
+        error = np.sqrt(own.size / (rows * columns)) * own.mean()
+        if error < constant:
+            levels[top:bottom, left:right] = level
+        elif error < 256 * constant and own.size > 1:
+            wide = bottom - top == 1 or (right - left > 1 and right - left >= bottom - top)
+            sums = np.cumsum(own.sum(0 if wide else 1))
+            cut = int(np.argmin(np.abs(2 * sums[:-1] - sums[-1]))) + 1
+            halves = ([(top, bottom, left, left + cut), (top, bottom, left + cut, right)] if wide
+                      else [(top, top + cut, left, right), (top + cut, bottom, left, right)])
+            return [block for half in halves for block in refine(level, *half)]
+        else:
+            return [(top, bottom, left, right)]
+        return []
+
+    blocks = [(0, rows, 0, columns)]
+    for level in range(count):
+        blocks = [block for old in blocks for block in refine(level, *old)]
+    return levels
 
 
 def gather(args):
-    rows = csv.writer(sys.stdout)
+    rows = csv.writer(sys.stdout, lineterminator="\n")
     rows.writerow(["scene", "spp", "tile", *COLUMNS])
     for folder in sorted(args.out.iterdir()):
         if not (folder / "estimate.csv").exists():
             continue
         found = {}
         for _, spp, tile, kind, own, around_ in csv.reader(open(folder / "estimate.csv")):
-            found[int(spp), kind, int(tile)] = min(float(own), float(around_))
+            found[int(spp), kind.replace("-", "_"), int(tile)] = min(float(own), float(around_))
         display = Display(0.5 * (load(folder, "reference-a.f32") + load(folder, "reference-b.f32")))
         jods = Jods(args.example)
         for level in LEVELS:
@@ -180,13 +258,15 @@ def gather(args):
             jods.ask((level, "sum"), shown, 1.4 * difference + common(a, b, 16, 1.0))
             jods.ask((level, "change"), shown, 1.4 * difference + 1.5 * change)
             jods.ask((level, "noise"), load(folder, f"on-{level:05}.luma", 1), load(folder, f"noise-{level:05}.luma", 1))
-            for name, values in zip(("dammertz", "relative"), plain_rules(folder, level, display.exposure)):
-                found.update({(level, name, tile): value for tile, value in enumerate(values)})
         found.update(jods.answers())
+        for name, planes_ in plain_rules(folder, display.exposure).items():
+            found.update({(level, name, tile): v for level, own in zip(LEVELS, planes_) for tile, v in enumerate(own)})
         for tile in range(len(TILES)):
-            rows.writerow([folder.name, 0, tile, "", f"{found[0, 'reference', tile]:.3f}", *[""] * (len(COLUMNS) - 2)])
+            truth = [f"{found[0, kind, tile]:.3f}" for kind in ("reference", "reference_denoised")]
+            rows.writerow([folder.name, 0, tile, "", *truth, *[""] * (len(COLUMNS) - 3)])
             for level in LEVELS:
-                rows.writerow([folder.name, level, tile, *(f"{found[level, name, tile]:.4f}" for name in COLUMNS)])
+                values = (f"{found[level, name, tile]:{'.4g' if name in PEOPLE else '.4f'}}" for name in COLUMNS)
+                rows.writerow([folder.name, level, tile, *values])
 
 
 def check(args):
@@ -250,18 +330,20 @@ def first_below(values, limit, first):
     return np.where(below.any(1), below.argmax(1), len(LEVELS))
 
 
-def play(estimate, first, limit, power):
-    """The rule as it runs, in one picture of tiles × levels: the last level of each tile, and whether it was satisfied there."""
-    levels = np.full(len(estimate), np.searchsorted(LEVELS, first))
+def play(estimate, first, limit, power, spp=SPP):
+    """The rule as it runs, in one picture of tiles × levels: the last level of each tile, and whether it was satisfied there.
+    The last of `spp` is what tiles count that are never satisfied."""
+    last = len(spp) - 1
+    levels = np.full(len(estimate), np.searchsorted(spp, first))
     need, fresh = np.full(len(estimate), -1), np.ones(len(estimate), bool)
     while True:
         for i in np.flatnonzero(fresh):
-            satisfied = levels[i] < len(LEVELS) and estimate[i, levels[i]] <= limit
+            satisfied = levels[i] < last and estimate[i, levels[i]] <= limit
             need[i] = (need[i] if need[i] >= 0 else levels[i]) if satisfied else -1
         done = need >= 0
-        most = np.where(done, SPP[need], SPP[levels]).max()
-        wanted = SPP[np.maximum(need, 0)] ** power * most ** (1 - power)
-        fresh = (levels < len(LEVELS)) & (~done | (wanted >= STEP * SPP[levels]))
+        most = np.where(done, spp[need], spp[levels]).max()
+        wanted = spp[np.maximum(need, 0)] ** power * most ** (1 - power)
+        fresh = (levels < last) & (~done | (wanted >= STEP * spp[levels]))
         if not fresh.any():
             return levels, done
         levels = levels + fresh
@@ -313,9 +395,9 @@ def where(corpus):
         print(f"{name}: {(values > 1).sum()} of {len(values)} beyond, ×{values.max():.2f}")
 
 
-def uniform_as_good(corpus, s, lost, measure):
+def uniform_as_good(curve, lost):
     """Samples after which one count for all has lost as little; beyond the last level as losses fall on average."""
-    curve = np.minimum.accumulate([measure(corpus.true[s, l][corpus.good[s]]) for l in range(len(LEVELS))])
+    curve, lost = np.minimum.accumulate(curve), max(lost, LEAST)
     if curve[0] <= lost:
         return SPP[0]
     if curve[-1] > lost:
@@ -325,52 +407,120 @@ def uniform_as_good(corpus, s, lost, measure):
     return SPP[at - 1] * (SPP[at] / SPP[at - 1]) ** share
 
 
-def rivals(corpus):
-    true = np.concatenate([corpus.true, corpus.true[:, -1:]], 1)
-    lost_at = lambda levels: np.take_along_axis(true, levels[:, None, :], 1)[:, 0]
+def kept_without(corpus, own, beyond, let_go):
+    """Which of the constants keep 19 of 20 tiles within the limit in all scenes of other families; of a mixed picture, in all that are
+    not in it."""
+    alone = len(set(own)) == 1
+    others = corpus.families != corpus.families[own[0]] if alone else ~np.isin(np.arange(len(corpus.names)), own)
+    return np.flatnonzero(beyond[:, others].sum(1) <= 0.05 * let_go[:, others].sum(1))
 
-    def ours(first, margin, power):
-        levels = np.zeros(corpus.good.shape, int)
+
+def our_hindsight(corpus, estimate):
+    """The same of the margin, the least that keeps the promise in other scenes, each of which is a picture."""
+    margins = np.arange(0.8, 1.6, 0.02)
+    let_go, beyond = np.zeros((2, len(margins), len(corpus.names)), int)
+    for i, margin in enumerate(margins):
         for s in corpus.scenes:
             t = np.flatnonzero(corpus.good[s])
-            levels[s, t], _ = play(GAIN * corpus.values["estimate"][s][:, t].T, first, LIMIT / margin, power)
-        return levels
+            levels, done = play(estimate[s][:, t].T, 32, LIMIT / margin, TOGETHER)
+            lost = corpus.true[s, np.minimum(levels, len(LEVELS) - 1), t]
+            let_go[i, s], beyond[i, s] = done.sum(), (done & (lost > LIMIT)).sum()
 
-    def hindsight(rule):
-        """With the largest constant that keeps 19 of 20 tiles within the limit in all other families."""
-        levels = np.zeros(corpus.good.shape, int)
-        for name in np.unique(corpus.families):
-            others = corpus.good & (corpus.families != name)[:, None]
-            for constant in np.exp(np.arange(2, -9, -0.05)):
-                found = first_below(corpus.values[rule], constant, 16)
-                let_go = others & (found < len(LEVELS))
-                if (lost_at(found)[let_go] > LIMIT).mean() <= 0.05:
-                    break
-            levels[corpus.families == name] = found[corpus.families == name]
-        return levels
+    def play_one(picture):
+        s, t = np.array(picture).T
+        margin = margins[kept_without(corpus, s, beyond, let_go)[0]]
+        return play(estimate[s, :, t], 32, LIMIT / margin, TOGETHER)[0], margin
 
-    print("\n| | samples | worst, most of 20, median, mean | beyond | uniform as good: worst | most of 20 | median | mean | behind uniform by most of 20 |")
-    print("|---|---|---|---|---|---|---|---|---|")
-    rules = {"before: to the limit, margin ×1.5, from 48": ours(48, BEFORE, 1), "drawn together, ×1.1, from 32": ours(32, MARGIN, TOGETHER),
-             "Dammertz et al., 0.0046": first_below(corpus.values["dammertz"], 0.0046, 16),
-             "Dammertz et al., best constant": hindsight("dammertz"), "relative error, best constant": hindsight("relative"),
-             "truth known": first_below(corpus.true, LIMIT, 16)}
+    return play_one
+
+
+def hindsight(corpus, rule):
+    """A rule with the largest constant that keeps the promise in other scenes; and that constant."""
+    constants = PEOPLE[rule] * TRIED
+    true = np.concatenate([corpus.true, corpus.true[:, -1:]], 1)
+    let_go, beyond = np.zeros((2, len(constants), len(corpus.names)), int)
+    for i, constant in enumerate(constants):
+        found = first_below(corpus.values[rule], constant * 1.0001, 16)
+        own = corpus.good & (found < len(LEVELS))
+        lost = np.take_along_axis(true, found[:, None, :], 1)[:, 0]
+        let_go[i], beyond[i] = own.sum(1), (own & (lost > LIMIT)).sum(1)
+
+    def play_one(picture):
+        s, t = np.array(picture).T
+        constant = constants[kept_without(corpus, s, beyond, let_go)[-1]]
+        return first_below(corpus.values[rule], constant * 1.0001, 16)[s, t], constant
+
+    return play_one
+
+
+def dammertz_of(corpus):
+    """People's constant, in the picture as a whole: scenes side by side, as square as they can be."""
+
+    def play_one(picture):
+        s, t = np.array(picture).T
+        scenes, side = list(dict.fromkeys(s)), EDGE // TILE
+        down = {1: 1, 4: 2, 12: 3}[len(scenes)]
+        blocks = corpus.values["dammertz"][scenes].reshape(down, -1, len(LEVELS), side, side)
+        levels = dammertz(blocks.transpose(2, 0, 3, 1, 4).reshape(len(LEVELS), down * side, -1), PEOPLE["dammertz"])
+        levels = levels.reshape(down, side, -1, side).transpose(0, 2, 1, 3).reshape(len(scenes), len(TILES))
+        return levels[[scenes.index(one) for one in s], t], PEOPLE["dammertz"]
+
+    return play_one
+
+
+def rivals(corpus):
+    estimate = GAIN * corpus.values["estimate"]
+
+    def ours(first, margin, power):
+        def play_one(picture):
+            s, t = np.array(picture).T
+            return play(estimate[s, :, t], first, LIMIT / margin, power)[0], margin
+
+        return play_one
+
+    def one_count(picture):
+        """When verdicts are satisfied with every tile."""
+        s, t = np.array(picture).T
+        passed = (estimate[s, :, t] <= LIMIT / MARGIN).all(0) & (LEVELS >= 32)
+        return np.full(len(s), passed.argmax() if passed.any() else len(LEVELS)), MARGIN
+
+    def people(rule):
+        return lambda picture: (first_below(corpus.values[rule], PEOPLE[rule] * 1.0001, 16)[*np.array(picture).T], PEOPLE[rule])
+
+    rules = {"before: to the limit, ×1.5, from 48": ours(48, BEFORE, 1), "**drawn together, ×1.1, from 32**": ours(32, MARGIN, TOGETHER),
+             "drawn together, margin in hindsight": our_hindsight(corpus, estimate),
+             "one count for all, when verdicts are satisfied with each": one_count, "Dammertz et al., people's": dammertz_of(corpus),
+             "Dammertz et al., in hindsight": hindsight(corpus, "dammertz"), "relative error, people's": people("relative"),
+             "relative error, in hindsight": hindsight(corpus, "relative"), "Cycles, people's": people("cycles"),
+             "Cycles, in hindsight": hindsight(corpus, "cycles"),
+             "the truth known": lambda picture: (first_below(corpus.true, LIMIT, 16)[*np.array(picture).T], LIMIT)}
     names = (np.max, lambda v: np.quantile(v, 0.95), np.median, np.mean)
-    for label, levels in rules.items():
-        lost, rows = lost_at(levels), []
-        for s in corpus.scenes:
-            good = corpus.good[s]
-            own = measures(lost[s][good])
-            count = SPP[levels[s]][good].mean()
-            rows.append([count, *own, *(uniform_as_good(corpus, s, max(v, LEAST), f) / count for v, f in zip(own, names))])
-        rows = np.array(rows)
-        m, middle = mean_of(rows), np.median(rows, axis=0)
-        let_go = np.zeros_like(corpus.good)
-        let_go[corpus.scenes] = True
-        let_go &= corpus.good & (levels < len(LEVELS))
-        share = f"{100 * (lost[let_go] > LIMIT).mean():.1f} %" if let_go.any() else "–"
-        print(f"| {label} | {m[0]:.0f} | " + ", ".join(f"{v:.2f}" for v in m[1:5]) + f" | {share} | "
-              + " | ".join(f"×{middle[k]:.2f} (×{m[k]:.2f})" for k in range(5, 9)) + f" | {(rows[:, 6] < 0.999).sum()} of {len(rows)} |")
+    for key in ("true", "true_denoised"):
+        values = np.concatenate([corpus.values[key], corpus.values[key][:, -1:]], 1)
+        for title, each in (("one scene", 1), ("four scenes", 4), ("twelve scenes", 12)):
+            pictures, ratios = pictures_of(corpus, each), {}
+            print(f"\n### {title}, {key}\n\n| | samples | worst, most of 20, median, mean | beyond | uniform as good, and ahead in: worst | most of 20"
+                  " | median | mean | better than ours by these |\n" + "|---" * 9 + "|")
+            lines = {}
+            for label, rule in rules.items():
+                rows, let_go, used = [], [], []
+                for picture in pictures:
+                    s, t = np.array(picture).T
+                    levels, constant = rule(picture)
+                    lost, count = values[s, levels, t], SPP[levels].mean()
+                    curves = [[f(values[s, l, t]) for l in range(len(LEVELS))] for f in names]
+                    rows.append([count, *measures(lost), *(uniform_as_good(c, v) / count for c, v in zip(curves, measures(lost)))])
+                    let_go += list(lost[levels < len(LEVELS)])
+                    used.append(constant)
+                rows, let_go = np.array(rows), np.array(let_go)
+                ratios[label] = rows[:, 5:]
+                m, middle = mean_of(rows), np.median(rows, axis=0)
+                share = f"{100 * (let_go > LIMIT).mean():.1f} %" if len(let_go) else "–"
+                lines[label] = (f"| {label} ({min(used):.3g} to {max(used):.3g}) | {m[0]:.0f} | " + ", ".join(f"{v:.2f}" for v in m[1:5]) + f" | {share} | "
+                                + " | ".join(f"×{middle[k]:.2f}, {(rows[:, k] < 0.999).sum()}" for k in range(5, 9)))
+            mine = ratios["**drawn together, ×1.1, from 32**"]
+            for label, line in lines.items():
+                print(line + " | " + ", ".join(str(n) for n in (ratios[label] > 1.001 * mine).sum(0)) + f" of {len(mine)} |")
 
 
 def estimates(corpus):
