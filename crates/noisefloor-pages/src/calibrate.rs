@@ -13,6 +13,3 @@ pub use course::{Calibration, CalibrationRefusal, CalibrationStage, CalibrationT
 pub use server::{CalibrateServer, CalibrateSetup};
 pub use simulate::SimulatedEyes;
 pub use tiles::{CalibrationTile, EDGE};
-
-/// Pictures of a trial. With four, an answer says twice as much about a threshold as with two.
-pub(crate) const CHOICES: usize = 4;

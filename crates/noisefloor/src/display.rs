@@ -1,7 +1,7 @@
 //! From linear radiance to what a screen shows: exposure, tone mapping, luminance.
 
 use crate::rgb::Rgb;
-use exposure::{LogAverage, NoisyPixel};
+use exposure::{DELTA, LogAverage, NoisyPixel};
 use multiversion::multiversion;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,7 @@ mod lut;
 mod srgb;
 mod tone_curve;
 mod tone_table;
+pub use crate::rgb::luminance;
 pub use cube::{CubeError, parse_cube};
 pub use lut::{ColourLut, LutInput, LutInputError};
 pub use srgb::{srgb_decode, srgb_encode};
@@ -28,17 +29,6 @@ pub const DEFAULT_KEY: f32 = 0.18;
 /// Least and most that an exposure can be.
 const DIMMEST: f32 = f32::from_bits(1);
 pub(crate) const BRIGHTEST: f32 = f32::MAX;
-
-/// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances
-/// above zero. The paper leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a
-/// geometric mean withstands fireflies.
-const DELTA: f64 = 1e-4;
-
-/// Rec.709 luminance of a linear RGB triple, in the unit of its input.
-#[inline(always)]
-pub fn luminance([r, g, b]: Rgb) -> f32 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
-}
 
 /// How a picture is to be displayed, before its exposure is known.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,10 +1,13 @@
 //! The course of a calibration: which picture is shown next, when it ends, and what it found.
 
-use super::{CHOICES, CalibrationTile};
+use super::tiles::CalibrationTile;
 use crate::questplus::{QuestGrid, QuestPlus};
 use crate::random::seeded;
 use noisefloor::{Oracle, Viewing};
 use std::sync::Arc;
+
+/// Pictures of a trial. With four, an answer says twice as much about a threshold as with two.
+pub(crate) const CHOICES: usize = 4;
 
 /// Prior standard deviation of the logarithm of the factor: two people of three need between half and twice the
 /// samples of the model's observers. SIN3D's two groups need 1.4 and 2.0 times as many, the students of

@@ -1,6 +1,7 @@
 //! A calibration in the browser: one person, one page.
 
-use super::{CHOICES, Calibration, CalibrationStage, CalibrationTile, EDGE, Factor};
+use super::course::{CHOICES, Calibration, CalibrationStage, Factor};
+use super::tiles::{CalibrationTile, EDGE};
 use crate::error::PagesError;
 use crate::http::{
     self, ASK, Exposure, Guard, HTML, LOOK, Listening, PICTURE, PageFile, Refusal, SCRIPT, SHEET, STYLE,

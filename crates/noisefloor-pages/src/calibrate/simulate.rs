@@ -1,6 +1,7 @@
 //! Observers made of numbers, who are calibrated: whether the factor that is found is theirs.
 
-use super::{CHOICES, Calibration, CalibrationStage, CalibrationTile, CalibrationTrial};
+use super::course::{CHOICES, Calibration, CalibrationStage, CalibrationTrial};
+use super::tiles::CalibrationTile;
 use crate::random::seeded;
 use noisefloor::{Oracle, Viewing};
 

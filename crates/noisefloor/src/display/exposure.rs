@@ -8,13 +8,17 @@
 //! so pooled with other dark pixels. Sums are kept on the way, so that sorting pixels by their own noisy
 //! values bends the result by the second order at most.
 
-use super::{DELTA, luminance};
-use crate::rgb::Rgb;
+use crate::rgb::{Rgb, luminance};
 use multiversion::multiversion;
 use rayon::prelude::*;
 
 mod block;
 pub(crate) use block::{NoisyBlock, PIXELS};
+
+/// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances
+/// above zero. The paper leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a
+/// geometric mean withstands fireflies.
+pub(super) const DELTA: f64 = 1e-4;
 
 /// Squared ratio of a mean to its standard error from which it is known. With a larger one, blocks are
 /// larger, and what the picture changes by within them counts as too bright; with a smaller one, pixels

@@ -1,8 +1,8 @@
 //! Correlations of differences of batches, over all that was seen.
 
+use super::said::{CERTAIN, FACTOR, Fault, NOTABLE, STRONG, Warning};
 use super::shift::Shift;
 use super::values::{Ends, Values};
-use super::{CERTAIN, FACTOR, Fault, NOTABLE, STRONG, Warning};
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Whether larger batches are brighter.
 
-use super::CERTAIN;
 use super::points::level;
+use super::said::CERTAIN;
 use crate::display::luminance;
 use crate::film::Film;
 use crate::tile::{Tile, TilePixels};

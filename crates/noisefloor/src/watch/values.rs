@@ -1,11 +1,14 @@
 //! The values of the first batches by themselves.
 
-use super::{Encoding, LEAST_VALUES, Precision, Warning};
+use super::said::{Encoding, Precision, Warning};
 use crate::display::{luminance, srgb_encode};
 use crate::rgb::Rgb;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::iter::Sum;
+
+/// Watched values without which nothing is said about values.
+const LEAST_VALUES: u64 = 64;
 
 /// Distance from a whole number of 255ths that is rounding.
 const NEAR: f32 = 4e-3;
