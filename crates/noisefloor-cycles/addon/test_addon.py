@@ -892,12 +892,12 @@ class Addon(unittest.TestCase):
 
         random = numpy.random.default_rng(2)
 
-        def left(counts):
+        def left(counts, fewest=(48, 48)):
             pair = [
                 {"Combined": numpy.float32(random.normal(0.5, 0.1, (64, 128, 4))), frame.COUNT: count}
                 for count in counts
             ]
-            return tune.alone(Excess(), pair, 48, 4096)
+            return tune.alone(Excess(), pair, fewest, 4096)
 
         def count(first, second):
             made = numpy.full((64, 128, 1), first, numpy.float32)
@@ -906,11 +906,18 @@ class Addon(unittest.TestCase):
 
         # All have the fewest, or the most, samples; all have more; and every other row has
         for counts, times in [((48, 48), 2), ((4096, 4096), 2), ((64, 640), 1), ((48, 64), 1.5)]:
-            self.assertAlmostEqual(left([count(*counts)] * 2) / 0.8, times**0.5, delta=0.03)
+            said, still = left([count(*counts)] * 2)
+            self.assertAlmostEqual(said / 0.8, times**0.5, delta=0.03)
+            self.assertEqual(still, times == 2)
+        # One picture has twice as many at the least, or a half more
+        for few, times in [(96, 1), (64, 1.5)]:
+            said, still = left([count(48, 48)] * 2, (48, few))
+            self.assertAlmostEqual(said / 0.8, times**0.5, delta=0.001)
+            self.assertTrue(still)
         # A place that is better, but whose pixels have the fewest, is worse alone
         part = count(64, 64)
         part[:, 64:] = 48
-        self.assertAlmostEqual(left([part, part]), 0.6 * 2**0.5, delta=0.01)
+        self.assertAlmostEqual(left([part, part])[0], 0.6 * 2**0.5, delta=0.01)
 
     def test_what_one_picture_leaves_is_what_it_leaves(self):
         """Predicted of a finer threshold, and looked at."""
@@ -919,18 +926,22 @@ class Addon(unittest.TestCase):
         scene.view_layers[0].cycles.pass_debug_sample_count = True
         params = settings.params(scene, display.table(scene))
 
-        def pair(threshold):
-            scene.cycles.adaptive_threshold, found = threshold, []
+        def pair(threshold, fewest=0):
+            scene.cycles.adaptive_threshold, scene.cycles.adaptive_min_samples, found = threshold, fewest, []
             for scene.cycles.seed in (31, 32):
                 with Passes() as plain:
                     bpy.ops.render.render()
                 (found_passes,) = plain.cycles["ViewLayer"]
-                found_passes[frame.COUNT] = sampling.counts(found_passes[frame.COUNT], 0, threshold, 4096)
+                found_passes[frame.COUNT] = sampling.counts(found_passes[frame.COUNT], fewest, threshold, 4096)
                 found.append(found_passes)
             return found, noisefloor.excess(*(each["Combined"][..., :3] for each in found), params=params)
 
-        pictures, coarse = pair(0.03)
-        said = tune.alone(coarse, pictures, sampling.least(0, 0.03, 4096), 4096)
+        single = sampling.least(0, 0.03 / 2**0.5, 4096)
+        each, fewest = sampling.half(single)
+        self.assertEqual((single, each, sampling.least(fewest, 0.03, 4096)), (64, 32, 32))
+        pictures, coarse = pair(0.03, fewest)
+        self.assertEqual(min(picture[frame.COUNT].min() for picture in pictures), 32)
+        said, _ = tune.alone(coarse, pictures, (each, single), 4096)
         self.assertTrue(coarse.ratio <= said < 2**0.5 * coarse.ratio, (coarse.ratio, said))
         _, fine = pair(0.03 / 2**0.5)
         # Of one picture, √2 times what their mean has; seeds differ

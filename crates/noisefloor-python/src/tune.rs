@@ -136,8 +136,8 @@ fn ratio(name: &str, value: f64) -> PyResult<f64> {
 }
 
 /// With what is known of one picture.
-fn with_alone(excess: Excess, alone: Option<f64>) -> PyResult<Excess> {
-    Ok(excess.with_alone(alone.map(|alone| ratio("alone", alone)).transpose()?))
+fn with_known(excess: Excess, alone: Option<f64>, still: bool) -> PyResult<Excess> {
+    Ok(excess.with_alone(alone.map(|alone| ratio("alone", alone)).transpose()?).with_still(still))
 }
 
 fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Tuning> {
@@ -194,22 +194,24 @@ impl PyTuning {
         }
     }
 
-    /// tell(excess, *, alone=None) --
+    /// tell(excess, *, alone=None, still=False) --
     ///
     /// What was found of the two pictures that next() has asked for: an Excess, or its ratio.
     ///
     /// alone: the ratio of one picture whose threshold is finer by the root of two, if it is known how the samples of pixels follow
     ///     the threshold: that of the mean where they do, and at most 1.41 times that where they do not. None: only pictures that
     ///     were rendered speak for a setting.
+    /// still: whether nearly all noise is of pixels that have the fewest samples that the renderer takes, so that a finer threshold
+    ///     changes nothing until others have more. Where alone is 1.41 times excess, that is known without.
     ///
     /// Raises ParameterError for a ratio that is negative or not a number, and for what was not asked for.
-    #[pyo3(signature = (excess, *, alone = None))]
-    fn tell(&self, excess: ExcessLike<'_>, alone: Option<f64>) -> PyResult<()> {
+    #[pyo3(signature = (excess, *, alone = None, still = false))]
+    fn tell(&self, excess: ExcessLike<'_>, alone: Option<f64>, still: bool) -> PyResult<()> {
         let excess = match excess {
             ExcessLike::Whole(whole) => whole.excess,
             ExcessLike::Ratio(value) => Excess::new(ratio("an excess", value)?),
         };
-        let excess = with_alone(excess, alone)?;
+        let excess = with_known(excess, alone, still)?;
         lock(&self.0).told()?.tell(excess);
         Ok(())
     }
@@ -290,14 +292,14 @@ impl PySearch {
         })
     }
 
-    /// tell(excess, *, alone=None) --
+    /// tell(excess, *, alone=None, still=False) --
     ///
-    /// What was found of the two pictures that next() has asked for, an Excess; alone as of a Tuning.
+    /// What was found of the two pictures that next() has asked for, an Excess; alone and still as of a Tuning.
     ///
     /// Raises ParameterError as that of a Tuning.
-    #[pyo3(signature = (excess, *, alone = None))]
-    fn tell(&self, excess: PyRef<'_, PyExcess>, alone: Option<f64>) -> PyResult<()> {
-        let told = with_alone(excess.excess, alone)?;
+    #[pyo3(signature = (excess, *, alone = None, still = false))]
+    fn tell(&self, excess: PyRef<'_, PyExcess>, alone: Option<f64>, still: bool) -> PyResult<()> {
+        let told = with_known(excess.excess, alone, still)?;
         lock(&self.0).told()?.tell(told, &excess.squares);
         Ok(())
     }

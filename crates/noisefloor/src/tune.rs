@@ -202,15 +202,19 @@ pub struct Excess {
     pub pictures: u64,
     /// The ratio expected of *one* picture whose threshold is finer by √2. Where noise follows the threshold, that picture is as
     /// good as the mean of two, and this is `ratio`; where every pixel has the fewest samples that the renderer takes, it is √2
-    /// times `ratio`. `None` if it is unknown how samples follow the threshold: then only rendered pictures count.
+    /// times `ratio`, unless the two had half of these each. `None` if it is unknown how samples follow the threshold: then only
+    /// rendered pictures count.
     pub alone: Option<f64>,
+    /// Whether nearly all noise is of pixels that have the fewest samples that the renderer takes: until others have more, a
+    /// finer threshold changes nothing. Where `alone` is √2 times `ratio`, that is known without.
+    pub still: bool,
 }
 
 impl Excess {
     /// From a ratio alone.
     pub fn new(ratio: f64) -> Self {
         let ratio = if ratio >= 0.0 { ratio } else { f64::INFINITY };
-        Self { ratio, place: None, pictures: 0, alone: None }
+        Self { ratio, place: None, pictures: 0, alone: None, still: false }
     }
 
     /// The same with [`Excess::place`].
@@ -229,6 +233,17 @@ impl Excess {
     #[must_use]
     pub fn with_alone(self, alone: Option<f64>) -> Self {
         Self { alone, ..self }
+    }
+
+    /// The same with [`Excess::still`].
+    #[must_use]
+    pub fn with_still(self, still: bool) -> Self {
+        Self { still, ..self }
+    }
+
+    /// [`Excess::still`], also by [`Excess::alone`].
+    fn is_still(&self) -> bool {
+        self.still || (self.alone.is_some() && self.of_finer() > STILL * self.of_each())
     }
 
     /// Of each of the two pictures, at the most: noise that they do not share is smaller by √2 in their mean.
@@ -518,7 +533,8 @@ impl Tuning {
             });
         }
         // Where pixels have the fewest samples that the renderer takes, finer thresholds may still help; where samples follow, no
-        let follows = self.is_samples() || last.excess.of_finer() < last.excess.of_each();
+        let follows =
+            self.is_samples() || (last.excess.of_finer() < last.excess.of_each() && !last.excess.still);
         if follows && self.is_flat() {
             return Next::Done(Ending::NotFalling { ratio });
         }
@@ -617,8 +633,7 @@ impl Tuning {
         }
         let measured = self.slopes().next_back().unwrap_or(NOISE);
         let slope = measured.clamp(SLOPES.0, SLOPES.1);
-        let still = last.excess.alone.is_some() && last.excess.of_finer() > STILL * last.excess.of_each();
-        let least = if still { BLIND } else { LEAST_STEP };
+        let least = if last.excess.is_still() { BLIND } else { LEAST_STEP };
         // On a plateau nothing says how far it reaches: each step goes twice as far as the one before
         let least = if measured.abs() < SAME { least.max(self.last_step().powi(2)) } else { least };
         (left / AIM).powf(1.0 / slope).clamp(least.min(LEAP), LEAP)
@@ -807,8 +822,18 @@ mod tests {
         (samples, (noise / 100.0).powf(power / 2.0), followed / noise)
     }
 
-    /// In frames with what was found, and how many samples more than the least these take; whether it is known how samples follow.
-    fn costs(fewest: f64, decades: f64, power: f64, share: f64, known: bool) -> (f64, f64, usize) {
+    /// What a search is told beside what is left.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Told {
+        Nothing,
+        /// How samples follow.
+        Alone,
+        /// The same, and each picture has half of the fewest samples.
+        Halved,
+    }
+
+    /// In frames with what was found, and how many samples more than the least these take.
+    fn costs(fewest: f64, decades: f64, power: f64, share: f64, told: Told) -> (f64, f64, usize) {
         let mut tuning = Tuning::new(Knob::Threshold { coarsest: 0.2, finest: 0.000_1 }).unwrap();
         let law = |threshold| mixed(fewest, decades, power, threshold);
         // What may be seen, as a share of what the coarsest threshold leaves
@@ -817,11 +842,16 @@ mod tests {
         let ending = loop {
             match tuning.next() {
                 Next::Render { each, .. } => {
-                    let (samples, wrong, followed) = law(each);
+                    let of_each = if told == Told::Halved { fewest / 2.0 } else { fewest };
+                    let (samples, wrong, followed) = mixed(of_each, decades, power, each);
                     cost += 2.0 * samples;
                     let ratio = wrong / needed / 2f64.powf(power / 2.0);
-                    let alone = known.then_some(ratio * (2.0 - followed).sqrt());
-                    tuning.tell(Excess { alone, ..Excess::new(ratio) });
+                    let (alone, still) = match told {
+                        Told::Nothing => (None, false),
+                        Told::Alone => (Some(ratio * (2.0 - followed).sqrt()), false),
+                        Told::Halved => (Some(ratio), followed < 0.12),
+                    };
+                    tuning.tell(Excess::new(ratio).with_alone(alone).with_still(still));
                 }
                 Next::Done(ending) => break ending,
             }
@@ -840,24 +870,26 @@ mod tests {
     /// Whatever the fewest samples: one picture is enough, and searching takes few.
     #[test]
     fn a_search_through_the_fewest_samples_is_short_and_not_dear() {
-        for (known, median, most, finer) in [(true, 2.0, 3.3, 3.0), (false, 3.0, 4.5, 5.0)] {
+        let all =
+            [(Told::Halved, 1.7, 2.7, 2.0), (Told::Alone, 2.0, 3.3, 3.0), (Told::Nothing, 3.0, 4.5, 5.0)];
+        for (told, median, most, finer) in all {
             let mut frames = Vec::new();
             for (fewest, decades) in
                 [(1.0, 0.0), (16.0, 2.0), (64.0, 2.0), (64.0, 4.0), (256.0, 3.0), (2_048.0, 3.0)]
             {
                 for power in [0.5, 0.8, 1.0] {
                     for share in [0.8, 0.4, 0.2, 0.1, 0.05] {
-                        let (cost, times, steps) = costs(fewest, decades, power, share, known);
+                        let (cost, times, steps) = costs(fewest, decades, power, share, told);
                         assert!(
                             cost <= most && times <= finer && steps <= 7,
-                            "{known}: {cost} {times} {steps} for {fewest}, {decades}, {power}, {share}"
+                            "{told:?}: {cost} {times} {steps} for {fewest}, {decades}, {power}, {share}"
                         );
                         frames.push(cost);
                     }
                 }
             }
             frames.sort_by(f64::total_cmp);
-            assert!(frames[frames.len() / 2] <= median, "{known}: {frames:?}");
+            assert!(frames[frames.len() / 2] <= median, "{told:?}: {frames:?}");
         }
     }
 

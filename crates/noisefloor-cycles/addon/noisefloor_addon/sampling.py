@@ -63,10 +63,17 @@ def adapt(cycles, seed, threshold, samples):
 
 
 def least(fewest, threshold, samples):
-    """The fewest samples that Cycles takes of a pixel with these settings: pixels stop after whole steps of 16, and not before
-    `fewest`, of which 0 are as many as Cycles takes on its own."""
+    """The fewest samples that Cycles takes of a pixel with these settings: pixels stop after whole steps of 16, the last sample
+    of which has a number above `fewest`, of which 0 are as many as Cycles takes on its own. The first sample has number 0."""
     fewest = fewest or math.ceil(16 / threshold**0.3)
-    return min((fewest // 16 + 1) * 16, samples)
+    return min(((fewest + 1) // 16 + 1) * 16, samples)
+
+
+def half(first):
+    """The fewest samples of each of two pictures that have as many together as one with `first` has, or up to 16 more; and what
+    to set for it."""
+    each = -(-first // 32) * 16
+    return each, each - 2
 
 
 def counts(shares, fewest, threshold, samples):

@@ -6,7 +6,6 @@ had been typed: Blender renders as ever, on any device, on any farm."""
 
 import math
 import time
-import types
 
 import bpy
 import noisefloor
@@ -56,8 +55,10 @@ class Search:
         )
         # What is rendered next; and how hard the hardest frames are, with the whole pictures that crops may be cut from
         self.look, self.whole, self.pictures, self.begun = self.search.next(), {}, [], 0.0
-        # Seconds so far, and of a sample, by the last picture, with its threshold and the samples of its pixels
+        # Seconds so far, and of a sample, by the last picture, with its threshold, the samples of its pixels, and the fewest
         self.spent, self.pace, self.counted, self.ending, self.stopped = 0.0, None, None, None, False
+        # The fewest samples of a pixel: of each picture, of one that is as good as both, and as they were set
+        self.fewest = None
         # Cycles loads the scene once for all of them
         self.borrowed, self.persistent = [], shot.use_persistent_data
         shot.use_persistent_data = True
@@ -72,10 +73,15 @@ class Search:
         if scene.frame_current != self.frames[self.look.view]:
             scene.frame_set(self.frames[self.look.view])
         cycles, shot = scene.cycles, scene.render
+        # Both pictures together have the samples of one whose threshold is finer by √2, also where pixels have the fewest
+        single = self.fewest_of_one(self.look.each / math.sqrt(2))
+        each, setting = sampling.half(single)
+        self.fewest = each, single, setting
         wanted = [
             (scene.noisefloor, "use", False),
             (cycles, "use_adaptive_sampling", True),
             (cycles, "adaptive_threshold", self.look.each),
+            (cycles, "adaptive_min_samples", setting),
             (cycles, "seed", (cycles.seed * 2 + len(self.pictures) + 1) % 2**31),
             (cycles, "use_animated_seed", False),
             (cycles, "use_denoising", False),
@@ -117,12 +123,12 @@ class Search:
             raise ValueError("nothing was rendered; is there a view layer that is used for rendering?")
         picture = next(iter(rendered.values()))
         cycles = self.scene.cycles
-        limits = cycles.adaptive_min_samples, self.look.each, cycles.samples
+        limits = self.fewest[2], self.look.each, cycles.samples
         picture[frame.COUNT] = sampling.counts(picture[frame.COUNT], *limits)
         self.pictures.append(picture)
         seconds = time.monotonic() - self.begun
         self.spent += seconds
-        self.counted = self.look.each, picture[frame.COUNT]
+        self.counted = self.look.each, picture[frame.COUNT], self.fewest[0]
         self.pace = seconds / self.counted[1].sum()
         if len(self.pictures) < 2:
             return
@@ -146,28 +152,29 @@ class Search:
     def _tell(self, pictures):
         """Judges two pictures, and tells the search."""
         excess = self.judge.excess(pictures)
-        self.search.tell(excess, alone=alone(excess, pictures, *self.fewest_and_most()))
+        said, still = alone(excess, pictures, self.fewest[:2], self.scene.cycles.samples)
+        self.search.tell(excess, alone=said, still=still)
         return excess
 
-    def fewest_and_most(self):
-        """Samples of a pixel of the pictures that are rendered now."""
+    def fewest_of_one(self, threshold):
+        """Samples of a pixel of a picture with the user's own settings and this threshold."""
         cycles = self.scene.cycles
-        return sampling.least(cycles.adaptive_min_samples, self.look.each, cycles.samples), cycles.samples
+        return sampling.least(cycles.adaptive_min_samples, threshold, cycles.samples)
 
-    def samples(self, look):
+    def samples(self, threshold, few, crop):
         """What a picture will take, over all its pixels: where they have more than the fewest samples, these follow the
         threshold."""
-        cycles, (each, counts) = self.scene.cycles, self.counted
-        few, next_few = (sampling.least(cycles.adaptive_min_samples, t, cycles.samples) for t in (each, look.each))
-        following = numpy.minimum(counts * (each / look.each) ** 2, cycles.samples)
-        mean = float(numpy.where(counts > few, following, numpy.maximum(counts, next_few)).mean())
-        return mean * (look.crop[2] * look.crop[3] if look.crop else self.size[0] * self.size[1])
+        each, counts, fewest = self.counted
+        following = numpy.minimum(counts * (each / threshold) ** 2, self.scene.cycles.samples)
+        mean = float(numpy.where(counts > fewest, numpy.maximum(following, few), few).mean())
+        return mean * (crop[2] * crop[3] if crop else self.size[0] * self.size[1])
 
     def left(self):
         """Seconds until this look is done, at about; None if nothing is known."""
         if self.counted is None or self.look is None:
             return None
-        return self.pace * self.samples(self.look) * (2 - len(self.pictures))
+        few = sampling.half(self.fewest_of_one(self.look.each / math.sqrt(2)))[0]
+        return self.pace * self.samples(self.look.each, few, self.look.crop) * (2 - len(self.pictures))
 
     def share(self):
         """How much of that has passed."""
@@ -203,26 +210,40 @@ class Search:
             people += f", frame {self.frames[self.search.views[0]]} is the hardest of {len(self.frames)}"
         if self.film:
             people += f", at {self.film:g} frames a second"
-        shot = types.SimpleNamespace(each=self.search.setting, crop=None)
-        people += f"; about {self.pace * self.samples(shot):.0f} s a frame"
+        setting = self.search.setting
+        seconds = self.pace * self.samples(setting, self.fewest_of_one(setting), None)
+        people += f"; about {seconds:.0f} s a frame"
         if compositor.denoises(self.scene) and not self.denoised:
             people += f"; {compositor.ADVICE}"
         return f"{self.search.setting:.3g}: {people}"
 
 
+# Less of the noise than this follows the threshold where it is taken to stand still
+STILL = 0.12
+
+
 def alone(excess, pictures, fewest, most):
     """What is left in one picture whose threshold is finer by the root of two, over what may be seen, by the samples that pixels
-    have: where they have more than the fewest and less than the most, noise follows the threshold."""
+    have; and whether finer thresholds change next to nothing.
+
+    Where pixels have more than the fewest and less than the most, their noise follows the threshold, and that one picture is as
+    good as both. fewest: those of each of the two, and of that one."""
     one, other = (picture["Combined"][..., :3] for picture in pictures)
     bright = (one + other).mean(axis=-1) / 2
     noise = ((one - other).mean(axis=-1) / (bright + bright.mean() + 1e-9)) ** 2
     counts = [picture[frame.COUNT][..., 0] for picture in pictures]
-    follows = numpy.logical_or(*((count > fewest) & (count < most) for count in counts))
+    follows = numpy.logical_or(*((count > fewest[0]) & (count < most) for count in counts))
+    at_most = numpy.logical_and(*(count >= most for count in counts))
+    # By how much the variance of that one is larger
+    larger = numpy.where(follows, 1.0, numpy.where(at_most, 2.0, 2.0 * fewest[0] / fewest[1]))
 
     def of_square(x, y, width, height, ratio):
         here = slice(y, y + height), slice(x, x + width)
-        share = noise[here][follows[here]].sum() / max(noise[here].sum(), 1e-30)
-        return ratio * math.sqrt(2 - share)
+        strength = noise[here] / max(noise[here].sum(), 1e-30)
+        share = float(strength[follows[here]].sum())
+        # Of a picture without any noise, nothing is known
+        more = float((strength * larger[here]).sum()) if strength.any() else 2.0
+        return ratio * math.sqrt(more), share < STILL
 
     return max(of_square(*square) for square in excess.squares())
 
