@@ -516,8 +516,8 @@ def rivals(corpus):
                 ratios[label] = rows[:, 5:]
                 m, middle = mean_of(rows), np.median(rows, axis=0)
                 share = f"{100 * (let_go > LIMIT).mean():.1f} %" if len(let_go) else "–"
-                lines[label] = (f"| {label} ({min(used):.3g} to {max(used):.3g}) | {m[0]:.0f} | " + ", ".join(f"{v:.2f}" for v in m[1:5]) + f" | {share} | "
-                                + " | ".join(f"×{middle[k]:.2f}, {(rows[:, k] < 0.999).sum()}" for k in range(5, 9)))
+                lines[label] = (f"| {label} ({min(used):.3g} to {max(used):.3g}) | {m[0]:.0f} | " + ", ".join(f"{v:.2f}" for v in m[1:5])
+                                + f" | {share} | " + " | ".join(f"×{middle[k]:.2f}, {(rows[:, k] < 0.999).sum()}" for k in range(5, 9)))
             mine = ratios["**drawn together, ×1.1, from 32**"]
             for label, line in lines.items():
                 print(line + " | " + ", ".join(str(n) for n in (ratios[label] > 1.001 * mine).sum(0)) + f" of {len(mine)} |")

@@ -1,0 +1,375 @@
+#!/usr/bin/env python3
+"""Where samples go in pictures of some size, by every rule at once: docs/benchmarks/real-size.md.
+
+    larger.py render EXAMPLE OUT MOST SCENE…    stores levels of two seeds, and a reference, by `denoised_corpus`; goes on where it stopped
+    larger.py gather OUT > larger.csv
+    larger.py tables larger.csv                 every rule, played on what is stored
+    larger.py whole NOISEFLOOR EXAMPLE OUT SCENE    renders a scene by the rule itself, and measures it with the same references
+
+A scene's folder has `1` and `2`, the seeds: halves at levels of samples, and what Open Image Denoise makes of them. A tile is sampled on
+only to four times what it, or one beside it, needs for a loss that is hardly noticed; beyond that, losses are taken to fall as they do
+on average. The reference has four times the samples of each tile, of a third seed, and is joined with the last level of the other seed.
+Needs numpy; scipy for denoised_corpus.py."""
+import argparse
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import at_the_stop as shown  # noqa: E402
+import denoised_corpus as corpus  # noqa: E402
+from denoised_corpus import DECAY, GAIN, LEAST, LIMIT, MARGIN, NOISY_REFERENCE, TOGETHER  # noqa: E402
+
+SIZE, TILE, SQUARE = (240, 135), 32, 64
+SEEDS = ("1", "2")
+REFERENCE_SEED, REFERENCE_TIMES = "77", 4
+RULES = ("dammertz", "relative-error", "cycles")
+# The constants that agree with people (criteria.md)
+PEOPLE = {"dammertz": 0.0046, "relative-error": 0.17, "cycles": 0.081}
+MEASURES = {"worst": np.max, "19 of 20": lambda v: np.quantile(v, 0.95), "median": np.median, "mean": np.mean}
+COLUMNS = "count seconds estimate noise unmet true true_denoised noisy noisy_denoised".split()
+
+
+def places(length):
+    """Where tiles begin and end along a side: what is left of less than half a tile is joined to the last."""
+    count = max((2 * length + TILE) // (2 * TILE), 1)
+    return [(i * TILE, (i + 1) * TILE if i + 1 < count else length) for i in range(count)]
+
+
+TILES = [(*x, *y) for y in places(SIZE[1]) for x in places(SIZE[0])]
+
+
+def load(path, channels=3):
+    return np.fromfile(path, dtype="<f4").astype(np.float64).reshape(SIZE[1], SIZE[0], channels)
+
+
+def name(scene):
+    return pathlib.Path(scene).parent.name
+
+
+def counts(folder):
+    """Samples and seconds of each tile, and what it would lose that lacks light, by level."""
+    found = {}
+    for row in csv.DictReader(open(folder / "counts.csv")):
+        found.setdefault(int(row["level"]), []).append((int(row["spp"]), float(row["seconds"]), float(row["unmet"])))
+    return {level: np.array(rows) for level, rows in found.items()}
+
+
+def last(folder):
+    """The last level's picture, and the samples of each of its pixels."""
+    level, rows = max(counts(folder).items())
+    picture = 0.5 * (load(folder / f"a-{level:05}.f32") + load(folder / f"b-{level:05}.f32"))
+    return picture, per_pixel(rows[:, 0])
+
+
+def per_pixel(spp):
+    plane = np.empty((SIZE[1], SIZE[0], 1))
+    for value, (left, right, top, bottom) in zip(spp, TILES):
+        plane[top:bottom, left:right] = value
+    return plane
+
+
+def render(args):
+    size = "x".join(map(str, SIZE))
+    for scene in args.scenes:
+        out = args.out / name(scene)
+        runs = [subprocess.Popen([args.example, "levels", out / seed, scene, size, seed, args.most]) for seed in SEEDS]
+        if any([run.wait() for run in runs]):
+            print(f"{out.name}: failed", flush=True)
+            continue
+        done = out / f"reference-{REFERENCE_SEED}.f32"
+        spp = REFERENCE_TIMES * np.max([max(counts(out / seed).items())[1][:, 0] for seed in SEEDS], axis=0).astype(int)
+        if not done.exists():
+            np.savetxt(out / "reference-spp.txt", spp, "%d")
+            subprocess.run([args.example, "reference", out, scene, size, REFERENCE_SEED, *map(str, spp)], check=True)
+        join(out, spp)
+        for seed in SEEDS:
+            for command in ("estimate", "rivals"):
+                said = subprocess.run([args.example, command, out / seed], capture_output=True, check=True).stdout
+                (out / seed / f"{command}.csv").write_bytes(said)
+        print(f"{out.name}: done", flush=True)
+
+
+def join(out, spp):
+    """Writes for each seed its reference, as two pictures that lie as far from their mean as its own noise is strong."""
+    one, n = load(out / f"reference-{REFERENCE_SEED}.f32"), per_pixel(spp)
+    for seed, other_seed in zip(SEEDS, SEEDS[::-1]):
+        other, m = last(out / other_seed)
+        mean, noise = (one * n + other * m) / (n + m), (one - other) * np.sqrt(n * m) / (n + m)
+        (mean + noise).astype("<f4").tofile(out / seed / "reference-a.f32")
+        (mean - noise).astype("<f4").tofile(out / seed / "reference-b.f32")
+
+
+def gather(args):
+    rows = csv.writer(sys.stdout, lineterminator="\n")
+    rows.writerow(["scene", "seed", "spp", "tile", *COLUMNS, *RULES])
+    for folder in sorted(f for out in sorted(args.out.iterdir()) for f in out.glob("[12]")):
+        if not (folder / "rivals.csv").exists():
+            continue
+        found = {}
+        for _, spp, tile, kind, own, around in csv.reader(open(folder / "estimate.csv")):
+            found[int(spp), kind.replace("-", "_"), int(tile)] = float(own) if kind == "noise" else min(float(own), float(around))
+        levels = counts(folder)
+        # The least constant of those tried with which a tile is done by each level
+        least = np.full((len(RULES), len(levels), len(TILES)), np.inf)
+        for rule, constant, stops in csv.reader(open(folder / "rivals.csv")):
+            for tile, letter in enumerate(stops):
+                if letter != "-":
+                    at = least[RULES.index(rule), ord(letter) - ord("a"):, tile]
+                    at[...] = np.minimum(at, float(constant))
+        for tile in range(len(TILES)):
+            lead = [folder.parent.name, folder.name]
+            truth = [f"{found[0, kind, tile]:.3f}" for kind in ("reference", "reference_denoised")]
+            rows.writerow([*lead, 0, tile, *[""] * 5, *truth, *[""] * (len(COLUMNS) - 7 + len(RULES))])
+            for i, (level, known) in enumerate(sorted(levels.items())):
+                spp, seconds, unmet = known[tile]
+                losses = [found[level, kind, tile] for kind in COLUMNS[2:] if kind != "unmet"]
+                values = [f"{v:.3f}" for v in (*losses[:2], unmet, *losses[2:])]
+                rows.writerow([*lead, level, tile, int(spp), f"{seconds:.3f}", *values, *(f"{v:.4g}" for v in least[:, i, tile])])
+
+
+def around(left, right, top, bottom):
+    """The square of 64 pixels around a tile, within the picture, as a verdict sees it."""
+    at = lambda low, high, side: min(max(low + (high - low) // 2 - SQUARE // 2, 0), side - SQUARE)
+    x, y = at(left, right, SIZE[0]), at(top, bottom, SIZE[1])
+    return x, x + SQUARE, y, y + SQUARE
+
+
+def greys(folder, made):
+    """Luma of a picture and of what is true, and which tiles and squares of it."""
+    truth = 0.5 * (load(folder / "reference-a.f32") + load(folder / "reference-b.f32"))
+    display = corpus.Display(truth)
+    test, reference = display.luma(made), display.luma(truth)
+    return [[(test[t:b, l:r], reference[t:b, l:r]) for l, r, t, b in (tile, around(*tile))] for tile in TILES]
+
+
+def whole(args):
+    """The rule itself, and what its picture has lost against the references of the same seed; lines of CSV."""
+    out = args.out / name(args.scene)
+    for seed in SEEDS:
+        with tempfile.TemporaryDirectory() as run:
+            options = ["--denoise", "oidn", "--size", "x".join(map(str, SIZE)), "--seed", seed, "--threads", "1", "--force", "--quiet"]
+            subprocess.run([args.noisefloor, "render", args.scene, *options, "--out", run], check=True)
+            made = shown.load(f"{run}/image-denoised.exr:0")[0]
+            stops = list(csv.DictReader(open(f"{run}/stops.csv")))
+            report = json.loads(pathlib.Path(f"{run}/report.json").read_text())
+        pairs = [pair for tile in greys(out / seed, made) for pair in tile]
+        data = b"".join(np.array(a.shape[::-1], dtype="<u4").tobytes() + a.astype("<f4").tobytes() + b.astype("<f4").tobytes() for a, b in pairs)
+        said = subprocess.run([args.example, "jods"], input=data, capture_output=True, check=True).stdout.split()
+        lost = np.array(said, dtype=float).reshape(-1, 2).min(1)
+        for stop, value in zip(stops, lost):
+            print(",".join([out.name, seed, stop["tile"] if "tile" in stop else "", stop["spp"], stop["reason"], f"{value:.3f}"]), flush=True)
+        print(json.dumps({k: report[k] for k in report if "second" in k or "denois" in k})[:600], file=sys.stderr)
+
+
+class Picture:
+    """All that is known of a scene and seed, by level and tile."""
+
+    def __init__(self, rows):
+        self.spp = np.array(sorted({int(r["spp"]) for r in rows} - {0}), dtype=float)
+        self.reference = np.array([float(r["true"]) for r in rows if r["spp"] == "0"])
+        shape = (len(self.spp), len(self.reference))
+        at = {int(n): i for i, n in enumerate(self.spp)}
+        for key in (*COLUMNS, *RULES):
+            plane = np.full(shape, np.nan)
+            for r in rows:
+                if r["spp"] != "0":
+                    plane[at[int(r["spp"])], int(r["tile"])] = float(r[key])
+            setattr(self, key.replace("-", "_"), plane)
+        # A tile that is not sampled any more loses as losses fall on average
+        further = (self.count / self.spp[:, None]).clip(None, 1)
+        for key, decay in (("true", DECAY), ("true_denoised", DECAY), ("estimate", DECAY), ("noise", 0.5), ("noisy", 0.5), ("noisy_denoised", 0.5)):
+            setattr(self, key, getattr(self, key) * further**decay)
+        # What a sample of each tile costs
+        self.cost = self.seconds[-1] / self.count[-1]
+        self.good = self.reference < NOISY_REFERENCE
+
+    def says(self):
+        """What a verdict says of each tile and level: the least of both pictures, unless light is likely to lack."""
+        either = np.minimum(GAIN * self.estimate, self.noise)
+        return np.where(self.unmet > LIMIT, np.inf, either)
+
+
+def read(path):
+    kept = {}
+    for row in csv.DictReader(open(path)):
+        kept.setdefault(row["scene"], {}).setdefault(row["seed"], []).append(row)
+    return {scene: [Picture(rows) for rows in seeds.values()] for scene, seeds in kept.items()}
+
+
+def above(picture):
+    return np.append(picture.spp, 2 * picture.spp[-1])
+
+
+def first_below(values, limit, first, spp):
+    below = (values <= limit) & (spp >= first)[:, None]
+    return np.where(below.any(0), below.argmax(0), len(spp))
+
+
+def lost_at(picture, levels, key):
+    """What each tile has lost at its level; of one that was never satisfied, at the last there is."""
+    return getattr(picture, key)[np.minimum(levels, len(picture.spp) - 1), np.arange(len(levels))]
+
+
+class Outcome:
+    """Of a rule in one picture: the last level of each tile, whether it let the tile go there, and which tiles it shows as rendered."""
+
+    def __init__(self, picture, levels, done=None, undenoised=None):
+        self.picture, self.levels = picture, levels
+        self.done = levels < len(picture.spp) if done is None else done
+        self.undenoised = np.zeros(len(levels), bool) if undenoised is None else undenoised
+
+    def lost(self, reference):
+        key, noisy = ("true", "noisy") if reference == "noisy" else ("true_denoised", "noisy_denoised")
+        lost = np.where(self.undenoised, lost_at(self.picture, self.levels, noisy), lost_at(self.picture, self.levels, key))
+        return lost[self.picture.good]
+
+    def samples(self):
+        return above(self.picture)[self.levels][self.picture.good].mean()
+
+    def seconds(self):
+        return (above(self.picture)[self.levels] * self.picture.cost).sum()
+
+    def let_go(self):
+        return self.done[self.picture.good]
+
+
+def ours(picture, first=32, margin=MARGIN, power=TOGETHER):
+    says, limit = picture.says(), LIMIT / margin
+    levels, done = corpus.play(says.T, first, limit, power, above(picture))
+    here = np.minimum(levels, len(picture.spp) - 1), np.arange(len(levels))
+    return Outcome(picture, levels, done, done & (GAIN * picture.estimate[here] > limit))
+
+
+def together(picture):
+    """One count for all, where all tiles are satisfied."""
+    passed = (picture.says() <= LIMIT / MARGIN).all(1) & (picture.spp >= 32)
+    return Outcome(picture, np.full(len(picture.reference), passed.argmax() if passed.any() else len(picture.spp)))
+
+
+def rival(picture, rule, constant):
+    return Outcome(picture, first_below(getattr(picture, rule.replace("-", "_")), constant * (1 + 1e-3), 16, picture.spp))
+
+
+def hindsight(scenes, rule):
+    """With the largest constant that keeps 19 of 20 tiles within the limit in all other scenes."""
+    tried = PEOPLE[rule] * np.exp(0.1 * np.arange(-30, 41))
+    beyond = {}
+    for scene, pictures in scenes.items():
+        outcomes = [[rival(p, rule, constant) for p in pictures] for constant in tried]
+        beyond[scene] = np.array([[sum((o.lost("noisy")[o.let_go()] > LIMIT).sum() for o in some), sum(o.let_go().sum() for o in some)]
+                                  for some in outcomes])
+    best = {}
+    for scene in scenes:
+        worse, of = sum((found for other, found in beyond.items() if other != scene), np.zeros((len(tried), 2))).T
+        kept = worse <= 0.05 * of
+        best[scene] = tried[np.flatnonzero(kept)[-1]] if kept.any() else tried[0]
+    return best
+
+
+def rules(scenes):
+    """Every rule in every picture, by its name."""
+    before = lambda picture: ours(picture, 48, corpus.BEFORE, 1)
+    every = {"ours": ours, "before: each to the limit, ×1.5, from 48": before, "one count, when all are satisfied": together}
+    found = {label: {scene: [rule(p) for p in pictures] for scene, pictures in scenes.items()} for label, rule in every.items()}
+    for rule in RULES:
+        best = hindsight(scenes, rule)
+        found[f"{rule}, people's"] = {s: [rival(p, rule, PEOPLE[rule]) for p in pictures] for s, pictures in scenes.items()}
+        found[f"{rule}, in hindsight"] = {s: [rival(p, rule, best[s]) for p in pictures] for s, pictures in scenes.items()}
+        print(f"{rule}: constants in hindsight {min(best.values()):.4g} to {max(best.values()):.4g}")
+    found["the truth known"] = {s: [Outcome(p, first_below(p.true, LIMIT, 16, p.spp)) for p in pictures] for s, pictures in scenes.items()}
+    return found
+
+
+def mean_over(outcomes, measure, reference):
+    return np.mean([measure(o.lost(reference)) for o in outcomes])
+
+
+def uniform_as_good(pictures, lost, measure, reference):
+    """Samples after which one count for all has lost as little, a mean of the seeds; and `<` or `≈` where that is before the first
+    level or beyond the last, where losses are taken to fall as they do on average."""
+    key = "true" if reference == "noisy" else "true_denoised"
+    spp = pictures[0].spp
+    curve = np.minimum.accumulate([np.mean([measure(getattr(p, key)[i][p.good]) for p in pictures]) for i in range(len(spp))])
+    lost = max(lost, LEAST)
+    if curve[0] <= lost:
+        return spp[0], "<"
+    if curve[-1] > lost:
+        return spp[-1] * (curve[-1] / lost) ** (1 / DECAY), "≈"
+    at = int(np.argmax(curve <= lost))
+    share = np.log(curve[at - 1] / lost) / np.log(curve[at - 1] / curve[at])
+    return spp[at - 1] * (spp[at] / spp[at - 1]) ** share, ""
+
+
+def compared(pictures, outcomes, reference):
+    """Samples, seconds, four measures, and by each of these what uniform takes of the samples, and of the seconds."""
+    samples, seconds = np.mean([o.samples() for o in outcomes]), np.mean([o.seconds() for o in outcomes])
+    a_sample = np.mean([p.cost.sum() for p in pictures])
+    lost = {by: mean_over(outcomes, measure, reference) for by, measure in MEASURES.items()}
+    same = {by: uniform_as_good(pictures, lost[by], measure, reference) for by, measure in MEASURES.items()}
+    return samples, seconds, lost, {by: (n, sign, n / samples, n * a_sample / seconds) for by, (n, sign) in same.items()}
+
+
+def tables(args):
+    scenes = read(args.rows)
+    played = rules(scenes)
+    good = {s: sum(p.good.sum() for p in pictures) for s, pictures in scenes.items()}
+    print(f"{len(scenes)} scenes; tiles with a reference: " + ", ".join(f"{s} {good[s]} of {2 * len(TILES)}" for s in scenes))
+    for s, pictures in scenes.items():
+        most = [(p.count[-1].max(), p.spp[-1]) for p in pictures]
+        print(s, "levels to", most, "and of 20 tiles 19 references have lost", [f"{np.quantile(p.reference, 0.95):.3f}" for p in pictures])
+    for reference in ("noisy", "denoised"):
+        print(f"\n### ours, {reference} reference\n| | samples | seconds | worst, 19 of 20, median, mean | beyond | "
+              + " | ".join(f"uniform, {by}" for by in MEASURES) + " | in seconds, worst |\n" + "|---" * 10 + "|")
+        for scene, pictures in scenes.items():
+            outcomes = played["ours"][scene]
+            samples, seconds, lost, same = compared(pictures, outcomes, reference)
+            each = " / ".join(f"{o.samples():.0f}" for o in outcomes)
+            beyond = sum((o.lost(reference)[o.let_go()] > LIMIT).sum() for o in outcomes)
+            let_go = sum(o.let_go().sum() for o in outcomes)
+            losses = " / ".join(", ".join(f"{m(o.lost(reference)):.2f}" for m in MEASURES.values()) for o in outcomes)
+            print(f"| {scene} | {each} | {seconds:.0f} | {losses} | {beyond} of {let_go} | "
+                  + " | ".join(f"{sign}{' ' if sign else ''}{n:.0f}, ×{ratio:.2f}" for n, sign, ratio, _ in same.values())
+                  + f" | ×{same['worst'][3]:.2f} |")
+        print(f"\n### rules, {reference} reference\n| | samples | seconds | worst, 19 of 20, median, mean | beyond | at most | "
+              + " | ".join(f"uniform, {by}" for by in MEASURES) + " | in seconds, worst |\n" + "|---" * 11 + "|")
+        for label, by_scene in played.items():
+            found = [compared(scenes[s], outcomes, reference) for s, outcomes in by_scene.items()]
+            gm = lambda values: np.exp(np.log(np.maximum(values, LEAST)).mean())
+            lost = np.concatenate([o.lost(reference)[o.let_go()] for outcomes in by_scene.values() for o in outcomes])
+            cells = [f"{gm([f[0] for f in found]):.0f}", f"{gm([f[1] for f in found]):.1f}",
+                     ", ".join(f"{gm([f[2][by] for f in found]):.2f}" for by in MEASURES),
+                     f"{(lost > LIMIT).sum()} of {len(lost)}", f"×{lost.max(initial=0) / LIMIT:.2f}"]
+            for by in MEASURES:
+                ratios = [f[3][by][2] for f in found]
+                cells.append(f"×{np.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}; {sum(r < 1 for r in ratios)} below 1)")
+            cells.append(f"×{np.median([f[3]['worst'][3] for f in found]):.2f}")
+            print(f"| {label} | " + " | ".join(cells) + " |")
+        print(f"\nbehind ours, by as good as uniform, {reference}:")
+        mine = {s: compared(scenes[s], played["ours"][s], reference)[3] for s in scenes}
+        for label, by_scene in played.items():
+            theirs = {s: compared(scenes[s], by_scene[s], reference)[3] for s in scenes}
+            ahead = {by: [s for s in scenes if theirs[s][by][2] > mine[s][by][2] * 1.001] for by in MEASURES}
+            print(f"- {label}: better than ours by " + "; ".join(f"{by} in {len(some)} ({', '.join(some)})" for by, some in ahead.items()))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(required=True)
+    words = {render: ["example", "out", "most", "scenes"], gather: ["out"], whole: ["noisefloor", "example", "out", "scene"], tables: ["rows"]}
+    for command, names in words.items():
+        sub = commands.add_parser(command.__name__)
+        sub.set_defaults(run=command)
+        for word in names:
+            sub.add_argument(word, nargs="+" if word == "scenes" else None, type=str if word in ("most", "scenes", "scene") else pathlib.Path)
+    args = parser.parse_args()
+    args.run(args)
+
+
+if __name__ == "__main__":
+    main()
