@@ -5,8 +5,8 @@
 //! `containers`, `shards` and `pictures` do so. Every target has seeds, small valid inputs.
 //!
 //! - `cargo test -p noisefloor-fuzz` runs the seeds, all inputs that ever failed (`found/TARGET/*`), and a
-//!   second of mutants of each target. It needs nothing but Rust; CI does it. `NOISEFLOOR_FUZZ_SECONDS=200`
-//!   sets another time; docs/numerics.md has what came of that.
+//!   half a second of mutants of each target. It needs nothing but Rust; CI does it with a tenth of a second.
+//!   `NOISEFLOOR_FUZZ_SECONDS=200` sets another time; docs/numerics.md has what came of that.
 //! - `fuzz/run TARGET` runs libFuzzer, which is led by coverage, on stable Rust (it needs a C++ compiler).
 //!   `fuzz/run --all SECONDS` runs all targets in turn.
 

@@ -6,9 +6,9 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 use tempfile::tempdir;
 
-/// A render of about a second, saved ten times a second.
+/// A render of about a second in a build for tests, saved ten times a second.
 fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    let args = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:2500", "--threads", "1"];
+    let args = ["render", "--size", "64x64", "--tile", "32", "--criterion", "spp:250", "--threads", "1"];
     [&args[..], &["--quiet", "--autosave", "0.1", "--out", out], more].concat()
 }
 

@@ -223,7 +223,7 @@ fn damaged_data_never_panics() {
     let (mut loaded, mut refused) = (0, 0);
     for data in [VALENCE, STANDARD, SEQUENTIAL] {
         let data = bytes(data);
-        for _ in 0..400 {
+        for _ in 0..150 {
             let mut data = data.clone();
             for _ in 0..=random.usize(..3) {
                 let at = random.usize(..data.len());
@@ -236,7 +236,7 @@ fn damaged_data_never_panics() {
             }
         }
     }
-    assert!(loaded > 50 && refused > 50, "{loaded} {refused}");
+    assert!(loaded > 20 && refused > 20, "{loaded} {refused}");
 }
 
 /// Without an accessor of indices, the faces are those of the data.

@@ -1,4 +1,5 @@
-//! Seeded damage: whatever the bytes, loading ends with a scene or an error, never a panic.
+//! Seeded damage: whatever the bytes, loading ends with a scene or an error, never a panic. The targets of `fuzz` try many
+//! more.
 
 use crate::kit::{Maker, json};
 use std::path::Path;
@@ -90,8 +91,8 @@ fn damage_never_panics() {
         let path = folder.path().join(name);
         std::fs::write(&path, &file).unwrap();
         noisefloor_scenefile::load(&path).unwrap();
-        let loaded = loaded(&file, &path, 3000, seed);
+        let loaded = loaded(&file, &path, 800, seed);
         // Damage that is never noticed, or always, tests nothing
-        assert!((150..2700).contains(&loaded), "{loaded} of 3000 damaged {name} were loaded");
+        assert!((40..720).contains(&loaded), "{loaded} of 800 damaged {name} were loaded");
     }
 }

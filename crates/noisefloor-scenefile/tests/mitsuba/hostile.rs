@@ -83,7 +83,7 @@ fn replace(path: &Path, bytes: &[u8]) {
 }
 
 /// Changed files are scenes or errors that name a file of the folder. That they never panic is seen by this
-/// ending.
+/// ending; the targets of `fuzz` try many more.
 #[test]
 fn changed_bytes_never_panic() {
     let folder = folder();
@@ -101,7 +101,7 @@ fn changed_bytes_never_panic() {
     ];
     let mut random = fastrand::Rng::with_seed(20);
     let mut broken = 0;
-    for round in 0..1600 {
+    for round in 0..400 {
         let path = folder.path().join(files[round % files.len()]);
         let original = std::fs::read(&path).unwrap();
         let mut bytes = original.clone();
@@ -129,7 +129,7 @@ fn changed_bytes_never_panic() {
         replace(&path, &original);
     }
     // Most changes matter
-    assert!(broken > 400, "{broken}");
+    assert!(broken > 100, "{broken}");
 }
 
 /// Any number of shapes can name one mesh that inflates a thousandfold: all together are in proportion to the files.
