@@ -11,7 +11,9 @@ use crate::say::note;
 use crate::spell::{JobPath, as_typed, with_frame};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::{ProgressiveSource, Rgb, Schedule, Tile, stills::SampleOrigin};
+use noisefloor::{
+    ProgressiveSource, Rgb, Schedule, SourceError, Tile, source::Reference, stills::SampleOrigin,
+};
 use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
@@ -124,6 +126,11 @@ pub trait Source: ProgressiveSource {
         None
     }
 
+    /// Renders a quick reference; `None` if it has none.
+    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
+        Ok(None)
+    }
+
     /// Shows how far a reference is, where it takes long, and gives it up once `cancel` is set.
     fn watch_reference(&mut self, _bar: ProgressBar, _cancel: Arc<AtomicBool>) {}
 
@@ -153,6 +160,10 @@ pub trait Source: ProgressiveSource {
 impl Source for Ptwne {
     fn counts(&self) -> Option<SampleCounts> {
         Some(Ptwne::counts(self))
+    }
+
+    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
+        Ptwne::reference(self).map(Some)
     }
 
     fn watch_reference(&mut self, bar: ProgressBar, cancel: Arc<AtomicBool>) {

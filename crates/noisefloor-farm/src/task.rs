@@ -75,7 +75,8 @@ pub fn sample(
 /// Checks that a batch is of what was asked for.
 fn check(info: &SourceInfo, request: &Request, batch: &Batch) -> Result<(), FarmError> {
     let pixels = if batch.spp == 0 { 0 } else { request.tile.pixels() };
-    if batch.spp <= info.counts.most(request) && batch.tile == request.tile && batch.mean.len() == pixels {
+    if batch.spp <= info.counts.most(request.spp) && batch.tile == request.tile && batch.mean.len() == pixels
+    {
         return Ok(());
     }
     let (pixels, spp, index) = (batch.mean.len(), batch.spp, request.tile.index);

@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let mut image = vec![[0.0; 3]; size * size];
     if rest.iter().any(|a| a == "reference") {
-        image = source.reference()?.ok_or("no reference")?.pixels;
+        image = source.reference()?.pixels;
         eprint!(", reference in {:.2} s", start.elapsed().as_secs_f64());
     } else {
         let tiles = TileGrid::new(size, size, 128)?.tiles();

@@ -175,6 +175,22 @@ impl Ptwne {
         self.sample_radiance = integrator(true);
     }
 
+    /// Renders the paper's reference (§4.3): direct light, mirrors and glass, without visible noise. It follows from the seed, and
+    /// changes no sample.
+    ///
+    /// # Errors
+    /// [`SourceError::Failed`] if it was cancelled, see [`Ptwne::watch_reference`].
+    pub fn reference(&mut self) -> Result<Reference, SourceError> {
+        let key = Key::new(self.options.seed);
+        let display = self.preview()?;
+        let size = [self.width, self.height];
+        let picture =
+            self.on_threads(|| reference::render(&self.scene, size, key, &display, self.watch.as_ref()));
+        let picture = picture.ok_or_else(|| self.fail(None, RenderError::Cancelled))?;
+        self.reference_noise = Some(picture.noise);
+        Ok(Reference::new((self.width, self.height), picture.pixels))
+    }
+
     /// Counts of the samples taken so far.
     pub fn counts(&self) -> SampleCounts {
         let read = |a: &AtomicU64| a.load(Ordering::Relaxed);
@@ -365,19 +381,6 @@ impl ProgressiveSource for Ptwne {
 
     fn sample_into(&mut self, requests: &[Request], batches: &mut Vec<Batch>) -> Result<(), SourceError> {
         self.render(requests, batches)
-    }
-
-    /// # Errors
-    /// [`SourceError::Failed`] if it was cancelled, see [`Ptwne::watch_reference`].
-    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
-        let key = Key::new(self.options.seed);
-        let display = self.preview()?;
-        let size = [self.width, self.height];
-        let picture =
-            self.on_threads(|| reference::render(&self.scene, size, key, &display, self.watch.as_ref()));
-        let picture = picture.ok_or_else(|| self.fail(None, RenderError::Cancelled))?;
-        self.reference_noise = Some(picture.noise);
-        Ok(Some(Reference::new((self.width, self.height), picture.pixels)))
     }
 
     /// Never fails.

@@ -54,6 +54,8 @@ pub(crate) fn ask<T: DeserializeOwned>(
 #[derive(Debug)]
 pub(crate) struct Described {
     pub(crate) info: SourceInfo,
+    /// Samples that it takes before it can stop, over all pixels of a tile.
+    pub(crate) late: u64,
     /// What the user should know.
     pub(crate) warnings: Vec<String>,
 }
@@ -69,15 +71,26 @@ pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
         return Err(wrong("it has no name".to_owned()));
     }
     let warnings = warnings.iter().map(|warning| printable(warning).into_owned()).collect();
-    let counts = if late > 0 { Counts::Late { overrun: late } } else { Counts::Asked };
+    let counts = if late > 0 { Counts::More } else { Counts::Asked };
     let info = SourceInfo::new(name, width, height).with_unit(unit).with_repeats(repeats).with_counts(counts);
-    Ok(Described { info, warnings })
+    Ok(Described { info, late, warnings })
 }
 
-/// The batches of a reply: as many as requests, none with more samples than `counts` allows.
+/// Most samples per pixel that are believed where `request` asks for some, of a renderer that takes `late` samples before it
+/// can stop.
+pub(crate) fn most(request: &Request, late: u64) -> u64 {
+    if late == 0 {
+        return request.spp;
+    }
+    // It may have been ahead by a batch, waits for pixels without samples (four more at most), and stops late
+    let overrun = late / request.tile.pixels().max(1) as u64;
+    request.spp.saturating_mul(2).saturating_add(overrun.saturating_add(8))
+}
+
+/// The batches of a reply: as many as requests, none with more samples than is believed.
 pub(crate) fn batches(
     requests: &[Request],
-    counts: Counts,
+    late: u64,
     Reply { header: Sampled { samples }, payload }: Reply<Sampled>,
 ) -> Result<Vec<Batch>, Blame> {
     if samples.len() != requests.len() {
@@ -85,7 +98,7 @@ pub(crate) fn batches(
         return Err((None, SidecarCause::Wrong { what }));
     }
     let given = || requests.iter().zip(samples.iter().copied());
-    if let Some((request, samples)) = given().find(|(request, samples)| *samples > counts.most(request)) {
+    if let Some((request, samples)) = given().find(|(request, samples)| *samples > most(request, late)) {
         let what = format!("{samples} samples where {} were requested", request.spp);
         return Err((Some(request.tile.index), SidecarCause::Wrong { what }));
     }

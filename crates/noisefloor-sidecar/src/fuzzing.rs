@@ -1,11 +1,11 @@
 //! An entry for fuzzers.
 
-use crate::call::{Described, Reply, batches, describe};
+use crate::call::{Described, Reply, batches, describe, most};
 use crate::frame;
 use crate::message::{Adapted, Hello, Sampled, Status};
-use noisefloor::{Counts, Request, Tile};
+use noisefloor::{Request, Tile};
 
-const LATE: Counts = Counts::Late { overrun: 1 << 17 };
+const LATE: u64 = 1 << 17;
 
 /// Reads bytes as a renderer's reply to each request there is, and says whether it is one. Not for other use.
 #[doc(hidden)]
@@ -24,8 +24,9 @@ pub fn read_any_reply(mut bytes: &[u8]) -> bool {
         let requests = [0, 1].map(|index| Request::new(tile(index), 0, 8));
         if let Ok(batches) = batches(&requests, LATE, Reply { header, payload: reply.payload }) {
             assert!(
-                batches.iter().all(|b| b.spp <= LATE.most(&requests[0])
-                    && [0, b.tile.pixels()].contains(&b.mean.len()))
+                batches.iter().all(
+                    |b| b.spp <= most(&requests[0], LATE) && [0, b.tile.pixels()].contains(&b.mean.len())
+                )
             );
         }
     }

@@ -32,6 +32,8 @@ pub struct Sidecar {
     launch: Launch,
     process: Option<Process>,
     info: SourceInfo,
+    /// Samples that it takes before it can stop, over all pixels of a tile.
+    late: u64,
     /// The scene as it was when the process loaded it.
     identity: SourceIdentity,
     warnings: Vec<String>,
@@ -56,11 +58,11 @@ impl Sidecar {
             .map_err(|cause| SidecarError::at_the_start(renderer, cause))?;
         // Before the scene is loaded: an edit in between is then noticed, if not now
         let identity = launch.contents()?;
-        let (process, Described { info, warnings: said }) = launch.start()?;
+        let (process, Described { info, late, warnings: said }) = launch.start()?;
         let identity = identity.with_options(&info.name);
         let warnings = options.warnings.into_iter().chain(said).collect();
         let (process, restarts, light) = (Some(process), Vec::new(), LightCheck::default());
-        Ok(Self { launch, process, info, identity, warnings, restarts, light })
+        Ok(Self { launch, process, info, late, identity, warnings, restarts, light })
     }
 
     /// As [`Sidecar::open`], with the interpreter that [`find`](crate::find) returns.
@@ -201,9 +203,9 @@ impl Sidecar {
             }
             [] => return Ok(Vec::new()),
         };
-        let (pixels, counts) = (requests.iter().map(|r| r.tile.pixels()).sum(), self.info.counts);
+        let (pixels, late) = (requests.iter().map(|r| r.tile.pixels()).sum(), self.late);
         let batches =
-            self.call(&doing, requests, &request, pixels, |reply| batches(requests, counts, reply))?;
+            self.call(&doing, requests, &request, pixels, |reply| batches(requests, late, reply))?;
         for batch in &batches {
             if let Err(cause) = self.light.check(&batch.mean) {
                 return Err(SidecarError {

@@ -9,7 +9,7 @@ mod reference;
 mod rounding;
 mod silence;
 
-pub use reference::check_reference_is_free_of_noise;
+pub use reference::check_reference;
 pub use silence::check_silence;
 
 use distribution::{LONG, check_distribution};
@@ -18,7 +18,6 @@ use first_hits::check_first_hits;
 use independence::check_independence;
 use noisefloor::{Counts, ProgressiveSource, Repeats, source::PixelNoise};
 use probe::{Round, Subject};
-use reference::check_reference;
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
@@ -55,8 +54,6 @@ const MOST_OF_A_RENDERER: usize = 8;
 /// - **Independence**: new samples are independent of those before, in the same tile and in others.
 /// - **Pixels**: the noise of neighbours is independent, unless
 ///   [`SourceInfo::pixels`](noisefloor::SourceInfo::pixels) says that they share samples.
-/// - **The reference**, if there is one, has the image's size and is finite, and rendering it changes no
-///   sample. Whether it is free of noise takes two seeds to tell: see [`check_reference_is_free_of_noise`].
 /// - **First hits**, if there are any, have the image's size, albedo in [0, 1] and normals no longer than 1.
 ///   Those of different indices are independent, or have no noise at all, and rendering them changes no
 ///   sample.
@@ -113,7 +110,7 @@ pub fn check_source<S: ProgressiveSource>(make: impl Fn() -> S) {
     if !playback {
         check_cuts(&subject);
     }
-    check_reference_changes_nothing(&subject, four);
+    check_first_hits_change_nothing(&subject, four);
     check_end(&subject, if playback { MOST_OF_A_PLAYBACK } else { MOST_OF_A_RENDERER });
 }
 
@@ -167,14 +164,13 @@ fn check_cuts<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>) {
     }
 }
 
-/// The reference and first hits are rendered for nobody's samples.
-fn check_reference_changes_nothing<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>, four: &[Round]) {
+/// First hits are rendered for nobody's samples.
+fn check_first_hits_change_nothing<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>, four: &[Round]) {
     let mut probe = subject.start();
-    check_reference(&mut probe.source, &subject.info);
     check_first_hits(&mut probe.source, &subject.info);
     let after = [probe.ask_all(16)];
     if subject.promises(Repeats::Calls) {
-        assert!(same(&after, &four[..1]), "rendering the reference or first hits changed the samples");
+        assert!(same(&after, &four[..1]), "rendering first hits changed the samples");
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! - [`check_source`] holds a source of samples to everything that
 //!   [`ProgressiveSource`](noisefloor::ProgressiveSource) promises. One call in a test is enough.
-//!   [`check_reference_is_free_of_noise`] looks at its reference.
+//!   [`check_reference`] looks at a quick reference, where the renderer has one.
 //! - [`Noise`] is a seeded stream of uniform and normal random numbers.
 //! - [`bilateral`] is a denoiser of a few lines.
 //! - [`require`] is for tests that need something which not every machine has, such as a renderer or Python.
@@ -51,7 +51,7 @@ mod process;
 mod requirement;
 
 pub use bilateral::bilateral;
-pub use contract::{broken_promise, check_reference_is_free_of_noise, check_silence, check_source};
+pub use contract::{broken_promise, check_reference, check_silence, check_source};
 pub use noise::Noise;
 #[cfg(target_os = "linux")]
 pub use process::{is_running, resident_kib};

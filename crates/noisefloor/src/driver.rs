@@ -12,7 +12,7 @@ use crate::session::{Interruption, Stop};
 use crate::session::{Session, SessionError};
 #[cfg(feature = "files")]
 use crate::source::Repeats;
-use crate::source::{Batch, ProgressiveSource, Request, SourceError};
+use crate::source::{Batch, ProgressiveSource, Reference, Request, SourceError};
 use crate::watch::Fault;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
@@ -134,6 +134,9 @@ impl Clock {
     }
 }
 
+/// Renders the quick noise-free reference of a source; `None` if it has none.
+pub type RenderReference<S> = fn(&mut S) -> Result<Option<Reference>, SourceError>;
+
 /// Drives a source until a criterion is satisfied.
 ///
 /// ```
@@ -162,6 +165,7 @@ impl Clock {
 pub struct Driver<S, C = Box<dyn StoppingCriterion + Send>> {
     source: S,
     session: Session<C>,
+    reference: Option<RenderReference<S>>,
     time_limit: Option<Duration>,
     cancel: Arc<AtomicBool>,
     /// The last ones, for their memory.
@@ -191,6 +195,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         Ok(Self {
             source,
             session,
+            reference: None,
             time_limit: None,
             cancel,
             batches: Vec::new(),
@@ -205,6 +210,12 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
     /// first, and one call is made however short the time.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         self.time_limit = limit;
+    }
+
+    /// How the source renders a quick noise-free reference. A run begins with it if the criterion needs one
+    /// ([`Needs::reference`](crate::criterion::Needs::reference)) and the session has none.
+    pub fn set_reference(&mut self, render: RenderReference<S>) {
+        self.reference = Some(render);
     }
 
     /// Setting this flag, from another thread or a signal handler, stops all tiles after the call under way.
@@ -264,7 +275,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         let start = Instant::now();
         self.samples_before = self.session.film().total_samples();
         self.seconds_before = self.clock.total_seconds;
-        if self.session.criterion().needs().reference {
+        if self.session.criterion().needs().reference && !self.session.has_reference() {
             self.fetch_reference(on_event)?;
         }
         while !self.session.is_done() {
@@ -311,7 +322,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
 
     fn fetch_reference(&mut self, on_event: &mut impl FnMut(&Session<C>, &Event)) -> Result<(), DriverError> {
         let began = Instant::now();
-        let reference = self.source.reference()?;
+        let reference = self.reference.map_or(Ok(None), |render| render(&mut self.source))?;
         let seconds = began.elapsed().as_secs_f64();
         self.clock.source_seconds += seconds;
         let Some(reference) = reference else {
@@ -359,7 +370,7 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
                 let what = format!("a batch of tile {} for tile {}", batch.tile.index, request.tile.index);
                 return Err(broken(what).into());
             }
-            if batch.spp > self.source.info().counts.most(request) {
+            if batch.spp > self.source.info().counts.most(request.spp) {
                 let (tile, asked) = (batch.tile.index, request.spp);
                 let what = format!("{} samples where {asked} were asked for, in tile {tile}", batch.spp);
                 return Err(broken(what).into());

@@ -243,6 +243,10 @@ impl<C: StoppingCriterion> Session<C> {
         Ok(())
     }
 
+    pub(crate) fn has_reference(&self) -> bool {
+        self.reference.is_some()
+    }
+
     /// What the open tiles need next; empty when all are done. Where halves are kept, requests fill one half
     /// at a time, so that the two stay even.
     pub fn requests(&self) -> Vec<Request> {

@@ -60,27 +60,19 @@ pub enum PixelNoise {
 pub enum Counts {
     /// As many as asked for; at its end what is left, and nothing from then on.
     Asked,
-    /// Now and then more, because its threads notice late that they have to stop.
-    Late {
-        /// Most samples that it takes in this time, over all pixels of a tile.
-        overrun: u64,
-    },
+    /// Now and then more, as where threads notice late that they have to stop; at its end what is left, and nothing from
+    /// then on.
+    More,
     /// What is stored, whatever is asked for: a playback.
     Stored,
 }
 
 impl Counts {
-    /// Most samples per pixel that are believed where `request` asks for some.
-    pub fn most(self, request: &Request) -> u64 {
-        let Request { tile, spp, .. } = request;
+    /// Most samples per pixel that keep the promise where `asked` are asked for.
+    pub fn most(self, asked: u64) -> u64 {
         match self {
-            Self::Asked => *spp,
-            // It may have been ahead by a batch, waits for pixels without samples (four more at most), and
-            // stops late
-            Self::Late { overrun } => spp
-                .saturating_mul(2)
-                .saturating_add((overrun / tile.pixels().max(1) as u64).saturating_add(8)),
-            Self::Stored => u64::MAX,
+            Self::Asked => asked,
+            Self::More | Self::Stored => u64::MAX,
         }
     }
 }
@@ -235,7 +227,9 @@ impl Batch {
     }
 }
 
-/// A quick noise-free picture of the scene, the reference of Takouachet et al. 2017, §4.3.
+/// A quick noise-free picture of the scene, the reference of Takouachet et al. 2017, §4.3. Few renderers have one, so it is no
+/// part of [`ProgressiveSource`]: a [`Driver`](crate::Driver::set_reference) is told how to render it, a session is
+/// [given](crate::Session::set_reference) it.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Reference {
@@ -387,15 +381,6 @@ pub trait ProgressiveSource {
     fn sample_into(&mut self, requests: &[Request], batches: &mut Vec<Batch>) -> Result<(), SourceError> {
         *batches = self.sample(requests)?;
         Ok(())
-    }
-
-    /// Renders the quick noise-free reference, if this source has one. Called at most once, and only if the
-    /// criterion needs it.
-    ///
-    /// # Errors
-    /// [`SourceError`] if the renderer failed.
-    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
-        Ok(None)
     }
 
     /// Renders albedo and normals of first hits from up to `spp` camera rays a pixel, if this source has them: fewer may do

@@ -1,7 +1,8 @@
 use crate::kit::{Altered, Synthetic};
 use noisefloor::{
     Batch, Driver, Event, FixedSpp, Model, Oracle, Params, People, ProgressiveSource, Rgb, Schedule, Session,
-    Stop, StopReason, StoppingCriterion, evidence::Evidence, model::ModelParts, source::Reference,
+    Stop, StopReason, StoppingCriterion, driver::RenderReference, evidence::Evidence, model::ModelParts,
+    source::Reference,
 };
 use noisefloor_ptwne::{Ptwne, RenderOptions, Sampling, scenes};
 use std::cell::RefCell;
@@ -42,7 +43,17 @@ impl Outcome {
 }
 
 fn run<S: ProgressiveSource, C: StoppingCriterion>(source: S, criterion: C, params: Params) -> Outcome {
+    run_with(source, |_| Ok(None), criterion, params)
+}
+
+fn run_with<S: ProgressiveSource, C: StoppingCriterion>(
+    source: S,
+    reference: RenderReference<S>,
+    criterion: C,
+    params: Params,
+) -> Outcome {
     let mut driver = Driver::new(source, criterion, params).unwrap();
+    driver.set_reference(reference);
     driver.run(|_, _| ()).unwrap();
     Outcome::of(driver.session())
 }
@@ -210,16 +221,10 @@ fn a_stack_that_ends_says_so() {
 #[test]
 fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
     // Halves are evidence enough
-    run(
-        Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")),
-        Oracle::bundled(),
-        small_tiles(),
-    );
-    run(
-        Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it")),
-        FixedSpp(100),
-        small_tiles(),
-    );
+    let needless = || Altered::reference(Synthetic::new(64, 32), || panic!("nobody needs it"));
+    let render: RenderReference<Altered<Synthetic>> = |source| Ok(source.render_reference());
+    run_with(needless(), render, Oracle::bundled(), small_tiles());
+    run_with(needless(), render, FixedSpp(100), small_tiles());
 
     // The same machine, held against a reference: here, the converged picture itself
     let parts = ModelParts { evidence: Evidence::Reference, ..Model::bundled().into_parts() };
@@ -236,13 +241,14 @@ fn the_reference_is_rendered_once_where_it_is_needed_and_never_elsewhere() {
         *count.borrow_mut() += 1;
         Some(Reference::new((64, 32), converged.clone()))
     });
-    let outcome = run(source, oracle(), small_tiles());
+    let outcome = run_with(source, render, oracle(), small_tiles());
     assert_eq!(*calls.borrow(), 1);
     assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Converged));
     assert!(outcome.halves.iter().all(|h| h[1] == 0), "halves were kept, and nobody reads them");
 
     // And the path tracer has one to give
-    let rendered = run(cornell(), oracle(), small_tiles().with_max_spp(100));
+    let reference: RenderReference<Ptwne> = |source| source.reference().map(Some);
+    let rendered = run_with(cornell(), reference, oracle(), small_tiles().with_max_spp(100));
     assert!(rendered.stops.iter().all(|s| s.probability.is_some()));
 }
 

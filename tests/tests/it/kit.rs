@@ -102,7 +102,7 @@ pub(crate) type Change = Box<dyn FnMut(&[Request], &mut Vec<Batch>)>;
 pub(crate) struct Altered<S> {
     pub(crate) source: S,
     pub(crate) batches: Change,
-    pub(crate) reference: Box<dyn FnMut() -> Option<Reference>>,
+    pub(crate) render_reference: Box<dyn FnMut() -> Option<Reference>>,
     pub(crate) first_hits: Box<dyn FnMut(u64) -> Option<FirstHits>>,
 }
 
@@ -113,7 +113,11 @@ impl<S: ProgressiveSource> Altered<S> {
 
     pub(crate) fn reference(source: S, reference: impl FnMut() -> Option<Reference> + 'static) -> Self {
         let (batches, first_hits): (Change, _) = (Box::new(|_, _| ()), Box::new(|_| None));
-        Self { source, batches, reference: Box::new(reference), first_hits }
+        Self { source, batches, render_reference: Box::new(reference), first_hits }
+    }
+
+    pub(crate) fn render_reference(&mut self) -> Option<Reference> {
+        (self.render_reference)()
     }
 
     pub(crate) fn first_hits(source: S, first_hits: impl FnMut(u64) -> Option<FirstHits> + 'static) -> Self {
@@ -130,10 +134,6 @@ impl<S: ProgressiveSource> ProgressiveSource for Altered<S> {
         let mut batches = self.source.sample(requests)?;
         (self.batches)(requests, &mut batches);
         Ok(batches)
-    }
-
-    fn reference(&mut self) -> Result<Option<Reference>, SourceError> {
-        Ok((self.reference)())
     }
 
     fn first_hits(&mut self, index: u64, _spp: u64) -> Result<Option<FirstHits>, SourceError> {

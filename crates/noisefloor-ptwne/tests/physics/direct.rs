@@ -1,7 +1,6 @@
 //! Direct light in closed form, and the ray-traced reference.
 
 use crate::kit::{agrees, batch, look, mean, scene};
-use noisefloor::ProgressiveSource;
 use noisefloor_ptwne::{
     Camera, Emission, Environment, EnvironmentMap, Estimator, Falloff, Gloss, ImageTexture, Lobes, Material,
     MaterialId, MaterialOptions, Mesh, Pixels, Ptwne, Punctual, RenderOptions, Scene, SceneBuilder, Sun,
@@ -31,7 +30,7 @@ pub(crate) fn lit(light: impl FnOnce(&mut SceneBuilder, MaterialId)) -> Scene {
 pub(crate) fn check(scene: &Scene, expected: f64) {
     check_samples(scene, expected);
     let mut source = Ptwne::new(scene.clone(), 4, 4, RenderOptions::default()).unwrap();
-    let pixels = source.reference().unwrap().unwrap().pixels;
+    let pixels = source.reference().unwrap().pixels;
     let reference = pixels.iter().map(|p| f64::from(p[0])).sum::<f64>() / 16.0;
     assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
 }
@@ -362,7 +361,7 @@ fn balls_stop_rays_on_both_sides() {
     };
     let seen = |scene: Scene| {
         let mut source = Ptwne::new(scene.clone(), 16, 16, RenderOptions::default()).unwrap();
-        let quick = source.reference().unwrap().unwrap().pixels;
+        let quick = source.reference().unwrap().pixels;
         let quick = quick.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>() / quick.len() as f64;
         (mean(scene, 16, 64, 16, 0, RenderOptions::default()), quick)
     };
@@ -392,7 +391,7 @@ fn backs_of_one_sided_surfaces_are_black() {
         });
         let mut source = Ptwne::new(scene, 4, 4, RenderOptions::default()).unwrap();
         let mut all = batch(&mut source, 0, 4);
-        all.extend(source.reference().unwrap().unwrap().pixels);
+        all.extend(source.reference().unwrap().pixels);
         assert!(all.iter().flatten().all(|x| (x - expected).abs() < 1e-5), "{all:?}");
     }
 }
@@ -402,8 +401,8 @@ fn backs_of_one_sided_surfaces_are_black() {
 fn the_reference_is_converged_direct_light() {
     let options = RenderOptions { max_depth: DIRECT, ..RenderOptions::default() };
     let mut source = Ptwne::new(scenes::by_name("cornell-box").unwrap(), 48, 48, options).unwrap();
-    let reference = source.reference().unwrap().unwrap().pixels;
-    assert_eq!(reference, source.reference().unwrap().unwrap().pixels);
+    let reference = source.reference().unwrap().pixels;
+    assert_eq!(reference, source.reference().unwrap().pixels);
     let halves = [batch(&mut source, 0, 512), batch(&mut source, 512, 512)];
     // Leave out the rows of the light itself: it is thirty times brighter than what it lights, and its edges
     // are accurate to 1/16 of a pixel

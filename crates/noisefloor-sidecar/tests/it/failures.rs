@@ -32,6 +32,7 @@ fn a_process_that_fails_again_and_again_is_an_error() {
         ("send no counts", "missing field `samples`"),
         ("claim many samples", "4294967295 samples where 1 were requested"),
         ("give too many", "4 samples where 1 were requested"),
+        ("stop much too late", "100001 samples where 1 were requested"),
     ];
     for (how, words) in wrong {
         let Some(fake) = Fake::new(how) else { return };

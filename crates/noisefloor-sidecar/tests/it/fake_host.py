@@ -90,7 +90,7 @@ class Fake:
             self.info = {}
         if self.told("ignore the end"):
             host._end = lambda: time.sleep(1000)
-        if self.told("stop late"):
+        if self.options.get("how") in ("stop late", "stop much too late"):
             self.info["late"] = 1 << 17
         if self.options.get("how") == "change" and starts > 1:
             self.info["width"] += 1
@@ -135,8 +135,7 @@ class Fake:
                     mean = mean[3:]
                 if self.told("be exhausted"):
                     samples = 0
-            if late and self.options.get("how") in ("stop late", "give too many"):
-                samples += 3
+            samples += late and {"stop late": 3, "give too many": 3, "stop much too late": 100000}.get(self.options.get("how"), 0)
             batches.append((samples, mean))
         if late and self.told("forget a tile"):
             batches.pop()

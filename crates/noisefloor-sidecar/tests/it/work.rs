@@ -22,7 +22,6 @@ fn samples_come_as_they_were_rendered() {
         }
     }
     assert!(source.sample(&[]).unwrap().is_empty());
-    assert!(source.reference().unwrap().is_none());
     assert!(source.restarts().is_empty());
 }
 

@@ -101,7 +101,7 @@ impl<S: ProgressiveSource> Probe<S> {
     /// then on.
     fn check_count(&mut self, request: &Request, samples: u64) {
         let (tile, asked) = (request.tile.index, request.spp);
-        let most = if self.ended[tile] { 0 } else { self.counts.most(request) };
+        let most = if self.ended[tile] { 0 } else { self.counts.most(asked) };
         assert!(samples <= most, "tile {tile}: {samples} samples where {asked} were asked for");
         self.ended[tile] |= self.counts != Counts::Stored && samples < asked;
     }

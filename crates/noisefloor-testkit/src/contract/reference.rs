@@ -1,26 +1,25 @@
-//! The reference of a source.
+//! The reference of a renderer that has one.
 
-use super::probe::EDGE;
+use super::exact::same;
+use super::probe::{EDGE, Subject};
 use noisefloor::{
-    Oracle, ProgressiveSource, SourceInfo, Tile, TileGrid, ToneMapping,
+    Oracle, ProgressiveSource, Repeats, Tile, TileGrid, ToneMapping,
+    driver::RenderReference,
     evidence::{Rendering, Samples, TilePlanes},
     source::Reference,
 };
 
-/// Checks that the oracle sees no noise in the reference of a source.
+/// Checks the quick reference of a renderer.
 ///
-/// `make` is given a seed and makes a source of the same scene each time. The reference of one seed is
-/// compared with that of another: each of its tiles must have converged (bundled model, P ≥ 0.9, tiles of
+/// `make` is given a seed and makes a source of the same scene each time; `render` renders its reference. It has the image's
+/// size and is finite, rendering it changes no sample, and it has no noise that the oracle sees. For that, the reference of one
+/// seed is compared with that of another: each of its tiles must have converged (bundled model, P ≥ 0.9, tiles of
 /// 32×32 pixels). Noise that does not depend on the seed is not found.
 ///
 /// # Panics
-/// If a tile has not converged, there is no reference, or [`check_source`](crate::check_source) rejects it.
-pub fn check_reference_is_free_of_noise<S: ProgressiveSource>(make: impl Fn(u64) -> S) {
-    let [one, other] = [1, 2].map(|seed| {
-        let mut source = make(seed);
-        let info = source.info();
-        check_reference(&mut source, &info).expect("the source has no reference")
-    });
+/// If a promise is not kept, or there is no reference. The message says which.
+pub fn check_reference<S: ProgressiveSource>(make: impl Fn(u64) -> S, render: RenderReference<S>) {
+    let [one, other] = [1, 2].map(|seed| sound(&Subject::new(|| make(seed)), render));
     let (size, oracle) = ((one.width, one.height), Oracle::bundled());
     let display = ToneMapping::default().settle(&one.pixels);
     // Each counts as one sample of a pixel
@@ -37,12 +36,18 @@ pub fn check_reference_is_free_of_noise<S: ProgressiveSource>(make: impl Fn(u64)
     }
 }
 
-/// The reference, if there is one: as large as the image, and finite.
-pub(super) fn check_reference(source: &mut impl ProgressiveSource, info: &SourceInfo) -> Option<Reference> {
-    let reference = source.reference().unwrap_or_else(|e| panic!("the reference failed: {e} ({e:?})"))?;
+/// The reference, in itself.
+fn sound<S: ProgressiveSource>(subject: &Subject<impl Fn() -> S>, render: RenderReference<S>) -> Reference {
+    let (mut probe, info) = (subject.start(), &subject.info);
+    let rendered = render(&mut probe.source).unwrap_or_else(|e| panic!("the reference failed: {e} ({e:?})"));
+    let reference = rendered.expect("the source has no reference");
     let size = (reference.width, reference.height);
     assert_eq!(size, (info.width, info.height), "the reference does not have the image's size");
     assert_eq!(reference.pixels.len(), info.width * info.height, "wrong number of pixels in the reference");
     assert!(reference.pixels.iter().flatten().all(|c| c.is_finite()), "the reference is not finite");
-    Some(reference)
+    if subject.promises(Repeats::Calls) {
+        let after = [probe.ask_all(16)];
+        assert!(same(&after, &subject.rounds(&[16])), "rendering the reference changed the samples");
+    }
+    reference
 }

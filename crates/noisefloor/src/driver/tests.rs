@@ -2,7 +2,7 @@ use super::*;
 use crate::criterion::{FixedSpp, Needs, Verdict, View};
 use crate::params::Schedule;
 use crate::session::StopReason;
-use crate::source::{Repeats, SourceInfo};
+use crate::source::{Reference, Repeats, SourceInfo};
 use crate::tile::Tile;
 
 /// A grey source that can be told to misbehave.
@@ -181,6 +181,21 @@ fn a_missing_reference_is_an_error_before_any_sample() {
     let error = driver.run(|_, _| ()).unwrap_err();
     assert!(matches!(error, DriverError::Criterion(CriterionError::NoReference(_))));
     assert!(driver.source.calls.is_empty());
+}
+
+#[test]
+fn a_reference_is_rendered_once_before_any_sample() {
+    let mut driver = Driver::new(Grey::default(), Picky, Params { tile: 32, ..Params::default() }).unwrap();
+    driver.set_reference(|source| {
+        assert!(source.calls.is_empty(), "samples came first");
+        Ok(Some(Reference::new((80, 32), vec![[0.5; 3]; 80 * 32])))
+    });
+    let mut ready = 0;
+    for _ in 0..2 {
+        // It has no verdicts, which is an error of a run
+        let _ = driver.run(|_, event| ready += usize::from(matches!(event, Event::ReferenceReady { .. })));
+    }
+    assert!(ready == 1 && !driver.source.calls.is_empty());
 }
 
 /// The tiles of a picture too large for one call grow together, in calls that are full.

@@ -95,6 +95,7 @@ impl Prepared {
             (_, None) => bail!("no model was read"),
         };
         let mut driver = Driver::new(source, criterion, params)?;
+        driver.set_reference(|source| source.reference());
 
         let folder = run.out.as_deref().map_or_else(|| PathBuf::from("out").join(&scene), PathBuf::from);
         let earlier = match run.earlier {
