@@ -6,6 +6,7 @@ Run it by a Python that has bpy (4.2 or later) and the wheel of noisefloor: the 
 --factory-startup --python test_addon.py -- ADDON.zip
 """
 
+import itertools
 import os
 import pathlib
 import sys
@@ -988,10 +989,10 @@ class Addon(unittest.TestCase):
         bpy.ops.render.render()
         self.assertRegex(drawn(scene)[2][1], r"^Takes two to three frames, about 0:\d\d to 0:\d\d$")
         self.assertFalse(bpy.ops.render.noisefloor_stop.poll())
-        shares, take = [], tune.Search.take
+        shares, advance = [], tune.Search.advance
 
         def record(self):
-            take(self)
+            advance(self)
             hooks.state.search = self
             shares.append((len(self.search.steps), self.share(), self.left()))
             said = drawn(scene)
@@ -999,12 +1000,12 @@ class Addon(unittest.TestCase):
             assert "picture" in said[1][1], said
             hooks.state.search = None
 
-        tune.Search.take = record
+        tune.Search.advance = record
         scene.cycles.samples = 4096
         try:
             bpy.ops.render.noisefloor_threshold()
         finally:
-            tune.Search.take = take
+            tune.Search.advance = advance
         self.assertGreater(len(shares), 1)
         self.assertTrue(all(0 <= share <= 1 for _, share, _ in shares), shares)
         self.assertTrue(all(left is None or left >= 0 for *_, left in shares), shares)
@@ -1042,15 +1043,14 @@ def looks(search):
     """The sizes of what a search looks at until the third picture is to be rendered, of fakes."""
     search.end()
     sizes = []
-    while search.look is not None and len(sizes) < 8:
-        sizes.append(search.look.crop)
+    for look in itertools.islice(search.search, 8):
+        sizes.append(look.crop)
         random = numpy.random.default_rng(len(sizes))
         pair = [
             numpy.float32(random.normal(0.5, 0.3, (*search.size[::-1], 3))) for _ in range(2)
         ]
         excess = noisefloor.excess(*pair, params=search.judge.params)
         search.search.tell(excess)
-        search.look = search.search.next()
     return set(sizes)
 
 

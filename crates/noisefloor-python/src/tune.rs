@@ -253,7 +253,10 @@ pub(crate) struct PyLook {
 /// Search(*, threshold=None, samples=None, views=1, size=None) --
 ///
 /// A Tuning over one or several views, such as frames of a sequence: all of them with the first setting, and then the
-/// hardest first, until one fails.
+/// hardest first, until one fails. What is to be rendered comes from a loop over it:
+///
+///     for look in search:
+///         search.tell(noisefloor.excess(render(look, seed=1), render(look, seed=2)))
 ///
 /// size: (width, height) of each view, if the renderer can render a part of it. Then crops around the worst squares stand
 ///     for a large picture, at most a third of its pixels, and the whole is looked at again in the end.
@@ -292,9 +295,23 @@ impl PySearch {
         })
     }
 
+    fn __iter__(search: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        search
+    }
+
+    /// The next Look, as next(); raises ParameterError if tell() was not called since the last one.
+    fn __next__(&self) -> PyResult<Option<PyLook>> {
+        if lock(&self.0).asked {
+            return Err(ParameterError::new_err(
+                "tell() what was found of this look, then ask for the next one",
+            ));
+        }
+        Ok(self.next())
+    }
+
     /// tell(excess, *, alone=None, still=False) --
     ///
-    /// What was found of the two pictures that next() has asked for, an Excess; alone and still as of a Tuning.
+    /// What was found of the two pictures that were asked for, an Excess; alone and still as of a Tuning.
     ///
     /// Raises ParameterError as that of a Tuning.
     #[pyo3(signature = (excess, *, alone = None, still = false))]

@@ -1215,11 +1215,14 @@ class Settings(unittest.TestCase):
             return np.float32(0.4 + look.each * noise)[y : y + height, x : x + width]
 
         search, looks = nf.Search(threshold=(0.05, 0.0001), views=2, size=size), []
-        while (look := search.next()) is not None:
+        for look in search:
             looks.append(look)
             self.assertIsNone(search.ending)
+            self.assertEqual((search.next().each, search.next().crop), (look.each, look.crop))
+            with self.assertRaisesRegex(nf.ParameterError, "tell"):
+                next(search)
             search.tell(nf.excess(render(look, 1), render(look, 2), params=params))
-        self.assertEqual((search.ending, search.views), ("found", [1, 0]))
+        self.assertEqual((search.ending, search.views, list(search)), ("found", [1, 0], []))
         whole = [(look.view, look.each) for look in looks if look.crop is None]
         self.assertEqual([view for view, _ in whole], [0, 1, 1, 0])
         crops = [look for look in looks if look.crop]

@@ -24,7 +24,8 @@ BORDER = ["use_border", "use_crop_to_border", "border_min_x", "border_max_x", "b
 
 
 class Search:
-    """A search, step by step. Settings of the scene are borrowed while a picture is rendered, and given back."""
+    """A search, picture by picture: whoever renders calls advance() before the first and after each. Settings of the scene are
+    borrowed while a picture is rendered, and given back."""
 
     def __init__(self, scene):
         # The layer that people see first stands for the frame
@@ -54,7 +55,8 @@ class Search:
             size=None if whole else self.size,
         )
         # What is rendered next; and how hard the hardest frames are, with the whole pictures that crops may be cut from
-        self.look, self.whole, self.pictures, self.begun = self.search.next(), {}, [], 0.0
+        self.look, self.whole, self.pictures, self.begun = None, {}, [], 0.0
+        self.running, self.done = self._run(), False
         # Seconds so far, and of a sample, by the last picture, with its threshold, the samples of its pixels, and the fewest
         self.spent, self.pace, self.counted, self.ending, self.stopped = 0.0, None, None, None, False
         # The fewest samples of a pixel: of each picture, of one that is as good as both, and as they were set
@@ -63,9 +65,38 @@ class Search:
         self.borrowed, self.persistent = [], shot.use_persistent_data
         shot.use_persistent_data = True
 
-    @property
-    def done(self):
-        return self.look is None
+    def advance(self):
+        """Goes on to where the next picture is to be rendered, with what it takes borrowed, or to the end."""
+        self.done = next(self.running, "end") == "end"
+
+    def _run(self):
+        """The search, which yields where Blender is to render."""
+        full = False
+        for self.look in self.search:
+            if self.look.is_rendered:
+                x, y, width, height = self.look.crop
+                here = slice(y, y + height), slice(x, x + width)
+                whole = self.whole[self.look.view][1]
+                self._tell([{name: each[here] for name, each in picture.items()} for picture in whole])
+                continue
+            if full:
+                self.ending = "unchanged"
+                break
+            if self.counted and (self.look.crop or self.look.each != self.counted[0]):
+                self.whole = {}
+            for _ in range(2):
+                self.borrow()
+                yield
+                self.pictures.append(self.take())
+            pictures, self.pictures = self.pictures, []
+            excess = self._tell(pictures)
+            full = all((picture[frame.COUNT] >= self.scene.cycles.samples).all() for picture in pictures)
+            if self.look.crop is None:
+                self.whole[self.look.view] = excess.ratio, pictures
+                # So many crops lie in so many frames at the most
+                if len(self.whole) > CROPS:
+                    del self.whole[min(self.whole, key=lambda view: self.whole[view][0])]
+        self.look, self.whole = None, {}
 
     def borrow(self):
         """What the next picture is rendered with."""
@@ -116,7 +147,7 @@ class Search:
             self.scene.frame_set(self.before)
 
     def take(self):
-        """The picture that was rendered; after the second, what they say."""
+        """The picture that was rendered."""
         rendered, hooks.state.rendered = hooks.state.rendered, {}
         self.give_back()
         if not rendered:
@@ -125,29 +156,11 @@ class Search:
         cycles = self.scene.cycles
         limits = self.fewest[2], self.look.each, cycles.samples
         picture[frame.COUNT] = sampling.counts(picture[frame.COUNT], *limits)
-        self.pictures.append(picture)
         seconds = time.monotonic() - self.begun
         self.spent += seconds
         self.counted = self.look.each, picture[frame.COUNT], self.fewest[0]
         self.pace = seconds / self.counted[1].sum()
-        if len(self.pictures) < 2:
-            return
-        pictures, self.pictures = self.pictures, []
-        excess = self._tell(pictures)
-        if self.look.crop is None:
-            self.whole[self.look.view] = excess.ratio, pictures
-            # So many crops lie in so many frames at the most
-            if len(self.whole) > CROPS:
-                del self.whole[min(self.whole, key=lambda view: self.whole[view][0])]
-        while (look := self.search.next()) and look.is_rendered:
-            x, y, width, height = look.crop
-            here = slice(y, y + height), slice(x, x + width)
-            self._tell([{name: each[here] for name, each in picture.items()} for picture in self.whole[look.view][1]])
-        if look is None or look.crop or look.each != self.look.each:
-            self.whole = {}
-        if look and all((picture[frame.COUNT] >= cycles.samples).all() for picture in pictures):
-            look, self.ending = None, "unchanged"
-        self.look = look
+        return picture
 
     def _tell(self, pictures):
         """Judges two pictures, and tells the search."""
@@ -173,8 +186,7 @@ class Search:
         """Seconds until this look is done, at about; None if nothing is known."""
         if self.counted is None or self.look is None:
             return None
-        few = sampling.half(self.fewest_of_one(self.look.each / math.sqrt(2)))[0]
-        return self.pace * self.samples(self.look.each, few, self.look.crop) * (2 - len(self.pictures))
+        return self.pace * self.samples(self.look.each, self.fewest[0], self.look.crop) * (2 - len(self.pictures))
 
     def share(self):
         """How much of that has passed."""
@@ -269,10 +281,10 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
         try:
             search = Search(context.scene)
             try:
+                search.advance()
                 while not search.done:
-                    search.borrow()
                     bpy.ops.render.render()
-                    search.take()
+                    search.advance()
                     print(search.status(), flush=True)
             finally:
                 search.end()
@@ -296,12 +308,12 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
             return {"CANCELLED"}
         self.timer = context.window_manager.event_timer_add(0.25, window=context.window)
         context.window_manager.modal_handler_add(self)
+        self.search.advance()
         self.start(context)
         return {"RUNNING_MODAL"}
 
     def start(self, context):
         hooks.state.ended = None
-        self.search.borrow()
         context.workspace.status_text_set(self.search.status() + "; Esc stops")
         bpy.ops.render.render("INVOKE_DEFAULT")
 
@@ -314,7 +326,7 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
         try:
             if hooks.state.ended == "cancelled" or self.search.stopped:
                 return self.end(context, {"CANCELLED"})
-            self.search.take()
+            self.search.advance()
             if not self.search.done:
                 self.start(context)
                 return {"RUNNING_MODAL"}
