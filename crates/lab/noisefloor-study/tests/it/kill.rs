@@ -3,11 +3,12 @@ use noisefloor_pages::http::Exposure;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use noisefloor_study::simulated::drive;
 use noisefloor_study::{Study, StudyServer, store};
+use noisefloor_testkit::HANG;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Names the study for [`serve_for_another_process`].
 pub(crate) const STUDY: &str = "NOISEFLOOR_TEST_STUDY";
@@ -100,7 +101,12 @@ fn kill_servers(kills: u64) {
                     drop(drive(url, "", &mut observer, counted));
                 });
             }
-            std::thread::sleep(Duration::from_millis(150 + 40 * (round % 5)));
+            // In the midst of their clicks, after more of them in each round
+            let (begun, enough) = (Instant::now(), 25 + 10 * (round % 5));
+            let so_far = || counts.iter().map(|count| count.load(Ordering::SeqCst)).sum::<u64>();
+            while so_far() < enough && begun.elapsed() < HANG {
+                std::thread::sleep(Duration::from_millis(1));
+            }
             child.kill().unwrap();
             child.wait().unwrap();
         });
