@@ -4,6 +4,7 @@
     larger.py render EXAMPLE OUT MOST SCENE…    stores levels of two seeds, and a reference, by `denoised_corpus`; goes on where it stopped
     larger.py gather OUT > larger.csv
     larger.py tables larger.csv                 every rule, played on what is stored
+    larger.py plot larger.csv OUT.svg           loss against run time; needs matplotlib
     larger.py whole NOISEFLOOR EXAMPLE OUT SCENE    renders a scene by the rule itself, and measures it with the same references
 
 A scene's folder has `1` and `2`, the seeds: halves at levels of samples, and what Open Image Denoise makes of them. A tile is sampled on
@@ -233,7 +234,8 @@ class Outcome:
         return above(self.picture)[self.levels][self.picture.good].mean()
 
     def seconds(self):
-        return (above(self.picture)[self.levels] * self.picture.cost).sum()
+        """Of tiles with a reference."""
+        return (above(self.picture)[self.levels] * self.picture.cost)[self.picture.good].sum()
 
     def let_go(self):
         return self.done[self.picture.good]
@@ -309,7 +311,7 @@ def uniform_as_good(pictures, lost, measure, reference):
 def compared(pictures, outcomes, reference):
     """Samples, seconds, four measures, and by each of these what uniform takes of the samples, and of the seconds."""
     samples, seconds = np.mean([o.samples() for o in outcomes]), np.mean([o.seconds() for o in outcomes])
-    a_sample = np.mean([p.cost.sum() for p in pictures])
+    a_sample = np.mean([p.cost[p.good].sum() for p in pictures])
     lost = {by: mean_over(outcomes, measure, reference) for by, measure in MEASURES.items()}
     same = {by: uniform_as_good(pictures, lost[by], measure, reference) for by, measure in MEASURES.items()}
     return samples, seconds, lost, {by: (n, sign, n / samples, n * a_sample / seconds) for by, (n, sign) in same.items()}
@@ -358,10 +360,46 @@ def tables(args):
             print(f"- {label}: better than ours by " + "; ".join(f"{by} in {len(some)} ({', '.join(some)})" for by, some in ahead.items()))
 
 
+def plot(args):
+    """Loss against processor seconds: one count for all (lines), ours (rings), plain rules with their best constants (crosses)."""
+    import matplotlib
+    matplotlib.use("svg")
+    # Text as text, and the same file for the same rows
+    matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "noisefloor", "font.size": 9})
+    from matplotlib import pyplot
+
+    scenes = read(args.rows)
+    best = {rule: hindsight(scenes, rule) for rule in RULES}
+    across = 5
+    down = -(-len(scenes) // across)
+    figure, panels = pyplot.subplots(down, across, figsize=(11, 2.5 * down), squeeze=False)
+    for panel in panels.flat[len(scenes):]:
+        panel.axis("off")
+    for panel, (scene, pictures) in zip(panels.flat, scenes.items()):
+        mean = lambda outcomes, by: (np.mean([o.seconds() for o in outcomes]), mean_over(outcomes, MEASURES[by], "noisy"))
+        uniform = [[Outcome(p, np.full(len(p.reference), i)) for p in pictures] for i in range(len(pictures[0].spp))]
+        for by, colour in (("worst", "#c0392b"), ("median", "#2c7fb8")):
+            panel.plot(*zip(*(mean(outcomes, by) for outcomes in uniform)), "-", color=colour, marker=".", linewidth=1, markersize=4)
+            plain = [mean([rival(p, rule, best[rule][scene]) for p in pictures], by) for rule in RULES]
+            panel.plot(*zip(*plain), "x", color=colour, markersize=5)
+            panel.plot(*mean([ours(p) for p in pictures], by), "o", color=colour, markersize=8, markerfacecolor="none", markeredgewidth=1.6)
+        panel.axhline(LIMIT, color="grey", linewidth=0.7, linestyle=":")
+        panel.set(xscale="log", yscale="log", title=scene, ylim=(0.02, 2.5))
+        panel.set_yticks([0.03, 0.1, 0.3, 1.0], ["0.03", "0.1", "0.3", "1"])
+        panel.minorticks_off()
+        low, high = panel.get_xlim()
+        ticks = [t for t in (0.3, 1, 3, 10, 30, 100) if low <= t <= high]
+        panel.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    figure.supxlabel("processor seconds")
+    figure.supylabel("JOD lost")
+    figure.tight_layout()
+    figure.savefig(args.out, metadata={"Date": None})
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(required=True)
-    words = {render: ["example", "out", "most", "scenes"], gather: ["out"], whole: ["noisefloor", "example", "out", "scene"], tables: ["rows"]}
+    words = {render: ["example", "out", "most", "scenes"], gather: ["out"], whole: ["noisefloor", "example", "out", "scene"], tables: ["rows"], plot: ["rows", "out"]}
     for command, names in words.items():
         sub = commands.add_parser(command.__name__)
         sub.set_defaults(run=command)
