@@ -203,7 +203,7 @@ mod tests {
             std::fs::create_dir_all(folder).expect("a folder");
         }
         assert_eq!(find_shared("human".as_ref(), None, &package), Some(data));
-        assert_eq!(find_shared("human/lisic9".as_ref(), None, &package), None);
+        assert_eq!(find_shared("human/nothing-of-that-name".as_ref(), None, &package), None);
         assert_eq!(find_shared("human".as_ref(), Some(&elsewhere), &package), None);
         assert_eq!(find_shared("elsewhere".as_ref(), Some(root.path()), &package), Some(elsewhere));
     }
