@@ -4,14 +4,13 @@ use crate::bands::{Bands, sensitivity, sensitivity_row};
 use crate::csf::{KNOTS, place};
 use crate::lanes::map_rows;
 use crate::masking::{
-    BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_row, transient_row,
+    BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_rows, transient_row,
 };
-use crate::part::Part;
-use crate::photometry::{CHANNELS, Photometry, grey_row, opponent_row};
+use crate::photometry::{CHANNELS, Photometry, greys, opponent_row};
 use crate::pyramid::{Size, expand_row, reduce};
 use crate::temporal::{ALL_CHANNELS, TRANSIENT, gains};
 use crate::viewing::Viewing;
-use crate::workspace::VisionWorkspace;
+use crate::workspace::{STRIP, VisionWorkspace};
 use multiversion::multiversion;
 use std::ops::Range;
 
@@ -54,8 +53,8 @@ impl Engine {
         workspace: &mut VisionWorkspace,
         mut read: impl FnMut(usize, &mut [[f32; 3]]),
     ) {
-        let VisionWorkspace { gauss, rows, .. } = workspace;
-        let codes = &mut rows.codes[..size.width];
+        let VisionWorkspace { gauss, strip, .. } = workspace;
+        let codes = &mut strip.codes[..size.width];
         let [a, b, c] = &mut gauss[of];
         for y in 0..size.height {
             read(y, codes);
@@ -67,20 +66,17 @@ impl Engine {
         }
     }
 
-    /// Converts greys into the finest level of picture `of`, only its achromatic channel.
+    /// Converts greys into the finest level of picture `of`, only its achromatic channel: of a picture and a share of its residual.
     pub(crate) fn load_grey(
         &self,
         of: usize,
         size: Size,
         workspace: &mut VisionWorkspace,
-        code: impl Fn(usize) -> f32,
+        picture: &[f32],
+        (share, residual): (f32, &[f32]),
     ) {
-        let plane = &mut workspace.gauss[of][0][0];
-        for from in (0..size.area()).step_by(size.width) {
-            let row = &mut plane[from..from + size.width];
-            row.iter_mut().enumerate().for_each(|(x, out)| *out = code(from + x));
-            grey_row(&self.photometry, row);
-        }
+        let out = &mut workspace.gauss[of][0][0][..size.area()];
+        greys(&self.photometry, picture, (share, residual), out);
     }
 
     /// In a film, filters the test picture over time: what it has beside `standing`, or beside the reference, is new
@@ -120,99 +116,100 @@ impl Engine {
         }
     }
 
-    /// Visible differences of a band, of `N` channels and that of films. Contrasts are worked out in the first part of it,
-    /// which has to have [`BLUR_RADIUS`] more pixels around, where there are any, than the second, in which
-    /// differences are.
+    /// Visible differences of a band, of `N` channels and that of films, in some of its rows. Contrasts are worked out in
+    /// the first of these rows, which have to have [`BLUR_RADIUS`] more on both sides, where there are any, than the
+    /// second, in which differences are.
     pub(crate) fn band<const N: usize>(
         &self,
         band: usize,
         size: Size,
-        (contrasts, differences): (Part, Part),
+        (contrasts, differences): (Range<usize>, Range<usize>),
         adapted: Adapted,
         workspace: &mut VisionWorkspace,
     ) {
         let blurs = size.width > BLUR_RADIUS && size.height > BLUR_RADIUS;
-        for y in contrasts.rows() {
-            self.contrasts::<N>((band, size), y, contrasts.columns(), (adapted, blurs), workspace);
+        for rows in strips(contrasts, size.width) {
+            self.contrasts::<N>((band, size), rows, (adapted, blurs), workspace);
         }
-        let VisionWorkspace { smaller, differences: planes, .. } = workspace;
-        let columns = differences.columns();
-        for y in differences.rows() {
-            let around: [usize; 2 * BLUR_RADIUS + 1] =
-                std::array::from_fn(|i| if blurs { reflected(y + i, size.height) } else { y });
-            let smaller: [_; N] =
-                std::array::from_fn(|c| around.map(|y| &smaller[c][y * size.width..][columns.clone()]));
+        let VisionWorkspace { smaller, differences: planes, strip: room, .. } = workspace;
+        let smaller: [&[f32]; N] = std::array::from_fn(|channel| &smaller[channel][..size.area()]);
+        for rows in strips(differences, size.width) {
             let [a, b, c, transient] = &mut *planes;
             let mut still = [a, b, c].into_iter();
-            let rows: [_; N] = std::array::from_fn(|_| still.next().expect("at most three channels"));
-            let from = y * size.width;
-            let rows = rows.map(|bands| &mut bands[band][from..][columns.clone()]);
-            let transient = self.film.map(|_| &mut transient[band][from..][columns.clone()]);
-            mask_row(&self.masking, blurs.then_some(&self.blur), smaller, rows, transient);
+            let strip = rows.start * size.width..rows.end * size.width;
+            let channels: [_; N] = std::array::from_fn(|_| still.next().expect("at most three channels"));
+            let channels = channels.map(|bands| &mut bands[band][strip.clone()]);
+            let transient = self.film.map(|_| &mut transient[band][strip.clone()]);
+            let blur = blurs.then_some(&self.blur);
+            let place = (smaller, size, rows.start);
+            mask_rows(&self.masking, blur, place, channels, transient, &mut room.mask);
         }
     }
 
-    /// Differences of contrasts and masking contrasts in row `y` of a band.
+    /// Differences of contrasts and masking contrasts in rows of a band, as many as a strip has.
     fn contrasts<const N: usize>(
         &self,
         (band, size): (usize, Size),
-        y: usize,
-        columns: Range<usize>,
+        ys: Range<usize>,
         (adapted, blurs): (Adapted, bool),
         workspace: &mut VisionWorkspace,
     ) {
-        let VisionWorkspace { gauss, flicker, differences, smaller, rows, .. } = workspace;
-        for (channels, coarse) in gauss.iter().zip(&mut rows.coarse) {
+        let VisionWorkspace { gauss, flicker, differences, smaller, strip, .. } = workspace;
+        let here = ys.start * size.width..ys.end * size.width;
+        for (channels, coarse) in gauss.iter().zip(&mut strip.coarse) {
             for (levels, coarse) in channels.iter().zip(coarse).take(N) {
-                expand_row(&levels[band + 1], size, y, &mut rows.narrow, coarse);
+                for (y, row) in ys.clone().zip(coarse.chunks_exact_mut(size.width)) {
+                    expand_row(&levels[band + 1], size, y, &mut strip.narrow, row);
+                }
             }
         }
-        let coarse = &rows.coarse;
+        let coarse: [[&[f32]; CHANNELS]; 2] = [0, 1].map(|of| {
+            std::array::from_fn(|channel| {
+                &strip.coarse[of][channel][..if channel < N { here.len() } else { 0 }]
+            })
+        });
         // What eyes are adapted to, and what the flicker of a film is seen on
         let [sensitive_to, flickers_on] = match adapted {
-            Adapted::ToReference => [1, 0].map(|of| &coarse[of][0][columns.clone()]),
+            Adapted::ToReference => [coarse[1][0], coarse[0][0]],
             Adapted::ToBoth => {
-                let mean = &mut rows.mean[columns.clone()];
-                let [test, reference] = [0, 1].map(|of| &coarse[of][0][columns.clone()]);
-                mean_row(test, reference, mean);
+                let mean = &mut strip.mean[..here.len()];
+                mean_row(coarse[0][0], coarse[1][0], mean);
                 [&*mean; 2]
             }
         };
-        let places = &mut rows.places[columns.clone()];
+        let places = &mut strip.places[..here.len()];
         place_row(sensitive_to, places);
-        let here = y * size.width + columns.start..y * size.width + columns.end;
+        let sensitivity = &mut strip.sensitivity[..here.len()];
         for channel in 0..N {
-            let sensitivity = &mut rows.sensitivity[..columns.len()];
             sensitivity_row(&self.bands.curves[band][channel], places, sensitivity);
             let [test, reference] = std::array::from_fn(|of| Row {
                 fine: &gauss[of][channel][band][here.clone()],
-                coarse: &coarse[of][channel][columns.clone()],
-                background: &coarse[of][0][columns.clone()],
+                coarse: coarse[of][channel],
+                background: coarse[of][0],
             });
-            let padded = &mut rows.padded[..columns.len() + 2 * BLUR_RADIUS];
             let difference = &mut differences[channel][band][here.clone()];
             let smaller = &mut smaller[channel][here.clone()];
-            if blurs {
-                contrast_row(
-                    test,
-                    reference,
-                    sensitivity,
-                    difference,
-                    &mut padded[BLUR_RADIUS..][..columns.len()],
-                );
-                pad(padded);
-                blur_row(&self.blur, padded, smaller);
-            } else {
+            if !blurs {
                 contrast_row(test, reference, sensitivity, difference, smaller);
+                continue;
+            }
+            let sharp = &mut strip.sharp[..here.len()];
+            contrast_row(test, reference, sensitivity, difference, sharp);
+            let padded = &mut strip.padded[..size.width + 2 * BLUR_RADIUS];
+            for (row, out) in sharp.chunks_exact(size.width).zip(smaller.chunks_exact_mut(size.width)) {
+                padded[BLUR_RADIUS..][..size.width].copy_from_slice(row);
+                pad(padded);
+                blur_row(&self.blur, padded, out);
             }
         }
         if self.film.is_some() {
-            expand_row(&flicker[band + 1], size, y, &mut rows.narrow, &mut rows.flicker);
-            let sensitivity = &mut rows.sensitivity[..columns.len()];
+            for (y, row) in ys.zip(strip.flicker.chunks_exact_mut(size.width)) {
+                expand_row(&flicker[band + 1], size, y, &mut strip.narrow, row);
+            }
             sensitivity_row(&self.bands.curves[band][TRANSIENT], places, sensitivity);
             let noise = Row {
                 fine: &flicker[band][here.clone()],
-                coarse: &rows.flicker[columns.clone()],
+                coarse: &strip.flicker[..here.len()],
                 background: flickers_on,
             };
             transient_row(noise, sensitivity, &mut differences[TRANSIENT][band][here]);
@@ -246,12 +243,12 @@ impl Engine {
 
 /// Builds the coarser levels of both pictures, in a film that of its flicker, too.
 pub(crate) fn build<const N: usize>(sizes: &[Size], film: bool, workspace: &mut VisionWorkspace) {
-    let VisionWorkspace { gauss, flicker, rows, .. } = workspace;
+    let VisionWorkspace { gauss, flicker, strip, .. } = workspace;
     let of_stills = gauss.iter_mut().flat_map(|channels| &mut channels[..N]);
     for levels in of_stills.chain(film.then_some(flicker)) {
         for (level, &size) in sizes[..sizes.len() - 1].iter().enumerate() {
             let (fine, coarse) = levels.split_at_mut(level + 1);
-            reduce(&fine[level], size, &mut rows.narrow, &mut coarse[0]);
+            reduce(&fine[level], size, &mut strip.narrow, &mut coarse[0]);
         }
     }
 }
@@ -280,11 +277,15 @@ pub(crate) fn collapse(
 /// Places of luminances among the knots of the table.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 fn place_row(luminances: &[f32], places: &mut [f32]) {
+    map_rows([luminances], [places], |[luminance]| [place_of(luminance)]);
+}
+
+/// The place of a luminance that is seen, among the knots.
+#[inline(always)]
+fn place_of(luminance: f32) -> f32 {
     const LAST: f32 = (KNOTS - 1) as f32;
-    map_rows([luminances], [places], |[luminance]| {
-        let at = place(if luminance > 0.01 { luminance } else { 0.01 });
-        [if at < LAST { at } else { LAST }]
-    });
+    let at = place(if luminance > 0.01 { luminance } else { 0.01 });
+    if at < LAST { at } else { LAST }
 }
 
 /// The mean of two rows.
@@ -293,10 +294,10 @@ fn mean_row(a: &[f32], b: &[f32], mean: &mut [f32]) {
     map_rows([a, b], [mean], |[a, b]| [0.5 * (a + b)]);
 }
 
-/// Row `padded` − [`BLUR_RADIUS`] of `height`, reflected at the border, which is not repeated.
-fn reflected(padded: usize, height: usize) -> usize {
-    let y = padded.abs_diff(BLUR_RADIUS);
-    if y < height { y } else { 2 * (height - 1) - y }
+/// Rows that are worked on together: as many as [`STRIP`] has room for.
+fn strips(rows: Range<usize>, width: usize) -> impl Iterator<Item = Range<usize>> {
+    let at_once = (STRIP / width).max(1);
+    rows.clone().step_by(at_once).map(move |y| y..(y + at_once).min(rows.end))
 }
 
 /// Reflects both ends of a row, which are not repeated.

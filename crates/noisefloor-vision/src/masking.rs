@@ -5,7 +5,9 @@
 use crate::lanes::{change_row, map_rows};
 use crate::math::{exp2, pow};
 use crate::photometry::CHANNELS;
+use crate::pyramid::Size;
 use crate::temporal::{ALL_CHANNELS, TRANSIENT};
+use crate::workspace::STRIP;
 use multiversion::multiversion;
 
 /// Exponent of the difference of contrasts.
@@ -157,54 +159,108 @@ impl Masking {
             offset: offset(EXPONENT),
         }
     }
+
+    /// How much a contrast of a channel masks, before it is weighted.
+    #[inline(always)]
+    fn power(&self, channel: usize, contrast: f32) -> f32 {
+        safe_pow(contrast * MASK_GAIN, MASK_EXPONENTS[channel], self.offsets[channel])
+    }
+
+    /// A visible difference from one of contrasts, and what masks it.
+    #[inline(always)]
+    fn visible(&self, difference: f32, mask: f32) -> f32 {
+        let difference = safe_pow(difference, EXPONENT, self.offset) / mask;
+        LARGEST * difference / (LARGEST + difference)
+    }
 }
 
-/// Most pixels of a row that are worked on at a time: few enough to stay in the nearest cache.
-const PIXELS: usize = 128;
+/// Room for a strip: powers of masking contrasts by channel, what masks, and differences before they are masked.
+#[derive(Clone, Debug)]
+pub(crate) struct MaskScratch {
+    powers: [[f32; STRIP]; CHANNELS],
+    mask: [f32; STRIP],
+    before: [f32; STRIP],
+}
+
+impl Default for MaskScratch {
+    fn default() -> Self {
+        Self { powers: [[0.0; STRIP]; CHANNELS], mask: [0.0; STRIP], before: [0.0; STRIP] }
+    }
+}
 
 /// Turns differences of contrasts into visible differences, in `N` channels at once, and in the transient one of
-/// a film. `smaller[channel]` has
-/// the rows of the masking contrast from [`BLUR_RADIUS`] above to as far below; `None` if the band is too
-/// small for a blur, in which case the middle row counts.
+/// a film: of rows from `first` on. `smaller` has the masking contrast of each channel in all of a band; without a blur,
+/// which the band may be too small for, it counts as it is.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-pub(crate) fn mask_row<const N: usize>(
+pub(crate) fn mask_rows<const N: usize>(
     masking: &Masking,
     blur: Option<&Blur>,
-    smaller: [[&[f32]; 2 * BLUR_RADIUS + 1]; N],
+    (smaller, size, first): ([&[f32]; N], Size, usize),
     differences: [&mut [f32]; N],
     transient: Option<&mut [f32]>,
+    MaskScratch { powers, mask, before }: &mut MaskScratch,
 ) {
-    let width = differences[0].len();
+    let from = first * size.width;
+    let length = differences[0].len();
     let mut channels = [const { None }; ALL_CHANNELS];
     differences.into_iter().enumerate().for_each(|(channel, row)| channels[channel] = Some(row));
     channels[TRANSIENT] = transient;
-    let mut powers = [[0.0; PIXELS]; N];
-    let [mut mask, mut visible] = [[0.0; PIXELS]; 2];
-    for from in (0..width).step_by(PIXELS) {
-        let n = PIXELS.min(width - from);
-        for (channel, power) in powers.iter_mut().enumerate() {
-            let (power, rows) = (&mut power[..n], smaller[channel].map(|row| &row[from..][..n]));
+    let greys = N == 1 && channels[TRANSIENT].is_none();
+    // Several rows of the picture, or a part of one
+    for at in (0..length).step_by(STRIP) {
+        let n = STRIP.min(length - at);
+        for (channel, power) in powers[..N].iter_mut().enumerate() {
+            let (power, smaller) = (&mut power[..n], smaller[channel]);
             match blur {
-                Some(blur) => blend(blur, rows, power),
-                None => power.copy_from_slice(rows[BLUR_RADIUS]),
+                Some(blur) => blur_down(blur, smaller, size, from + at, power),
+                None => power.copy_from_slice(&smaller[from + at..][..n]),
             }
-            let (exponent, offset) = (MASK_EXPONENTS[channel], masking.offsets[channel]);
-            change_row(power, |value| safe_pow(value * MASK_GAIN, exponent, offset));
+            if !greys {
+                change_row(power, |contrast| masking.power(channel, contrast));
+            }
         }
         for (channel, out) in channels.iter_mut().enumerate() {
             let Some(out) = out else { continue };
-            let mask = &mut mask[..n];
+            let out = &mut out[at..][..n];
+            let (mask, before) = (&mut mask[..n], &mut before[..n]);
+            before.copy_from_slice(out);
+            if greys {
+                // In one loop: most of the time of a tile is spent here
+                let Masking { weights, .. } = *masking;
+                map_rows([before, &powers[0][..n]], [out], |[difference, contrast]| {
+                    let mask = 1.0 + weights[0][0] * masking.power(0, contrast);
+                    [masking.visible(difference, mask)]
+                });
+                continue;
+            }
             mask.fill(1.0);
-            for (power, weights) in powers.iter().zip(&masking.weights) {
+            for (power, weights) in powers[..N].iter().zip(&masking.weights) {
                 let weight = weights[channel];
                 mask.iter_mut().zip(power).for_each(|(mask, power)| *mask += weight * power);
             }
-            let row = &mut out[from..][..n];
-            visible[..n].copy_from_slice(row);
-            map_rows([&visible[..n], mask], [row], |[difference, mask]| {
-                let difference = safe_pow(difference, EXPONENT, masking.offset) / mask;
-                [LARGEST * difference / (LARGEST + difference)]
-            });
+            map_rows([before, mask], [out], |[difference, mask]| [masking.visible(difference, mask)]);
         }
     }
+}
+
+/// Blurs down the columns of a band, from a pixel on, counted row by row.
+#[inline(always)]
+fn blur_down(blur: &Blur, plane: &[f32], size: Size, from: usize, out: &mut [f32]) {
+    let mut done = 0;
+    while done < out.len() {
+        let (y, x) = ((from + done) / size.width, (from + done) % size.width);
+        let n = (size.width - x).min(out.len() - done);
+        let mut rows: [&[f32]; 2 * BLUR_RADIUS + 1] = [&[]; 2 * BLUR_RADIUS + 1];
+        for (i, row) in rows.iter_mut().enumerate() {
+            *row = &plane[reflected(y + i, size.height) * size.width + x..][..n];
+        }
+        blend(blur, rows, &mut out[done..done + n]);
+        done += n;
+    }
+}
+
+/// Row `padded` − [`BLUR_RADIUS`] of `height`, reflected at the border, which is not repeated.
+fn reflected(padded: usize, height: usize) -> usize {
+    let y = padded.abs_diff(BLUR_RADIUS);
+    if y < height { y } else { 2 * (height - 1) - y }
 }

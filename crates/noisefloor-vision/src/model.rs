@@ -4,7 +4,6 @@ use crate::check::{check_pixels, checked};
 use crate::engine::{Adapted, Engine, build, collapse};
 use crate::error::VisionError;
 use crate::masking::EPSILON;
-use crate::part::Part;
 use crate::photometry::CHANNELS;
 use crate::pooling;
 use crate::pyramid::Size;
@@ -112,8 +111,8 @@ impl VisionModel {
         let baseband = sizes.len() - 1;
         let mut pooled = Vec::with_capacity(sizes.len());
         for (band, &size) in sizes[..baseband].iter().enumerate() {
-            let whole = Part::whole(size);
-            engine.band::<CHANNELS>(band, size, (whole, whole), Adapted::ToReference, workspace);
+            let whole = 0..size.height;
+            engine.band::<CHANNELS>(band, size, (whole.clone(), whole), Adapted::ToReference, workspace);
             pooled.push(pool(&workspace.differences, band, size, film));
         }
         engine.baseband(baseband, sizes[baseband], workspace);
@@ -133,7 +132,7 @@ impl VisionComparison<'_> {
     /// Where the difference is: JODs lost, row by row, in the size of the pictures. Ten times the raw map of
     /// ColorVideoVDP 0.5.7.
     pub fn map(&mut self) -> &[f32] {
-        let VisionWorkspace { differences, map, rows, .. } = &mut *self.workspace;
+        let VisionWorkspace { differences, map, strip, .. } = &mut *self.workspace;
         let last = self.sizes.len() - 1;
         for (band, (size, map)) in self.sizes.iter().zip(&mut *map).enumerate() {
             let weight = |channel: usize| {
@@ -153,7 +152,7 @@ impl VisionComparison<'_> {
         }
         let sizes = &self.sizes;
         let whole = |band: usize| 0..sizes[band].height;
-        collapse(map, 0..sizes.len(), sizes, whole, &mut rows.narrow, &mut rows.places);
+        collapse(map, 0..sizes.len(), sizes, whole, &mut strip.narrow, &mut strip.places);
         let map = &mut map[0][..self.sizes[0].area()];
         pooling::lost_in(map);
         map

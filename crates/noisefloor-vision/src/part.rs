@@ -11,10 +11,6 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    pub(crate) fn whole(size: Size) -> Self {
-        Self { x: (0, size.width), y: (0, size.height) }
-    }
-
     pub(crate) fn columns(self) -> Range<usize> {
         self.x.0..self.x.1
     }

@@ -1,5 +1,6 @@
 //! Code values → light of the display → opponent channels, in cd/m².
 
+use crate::lanes::map_rows;
 use crate::math::{exp2, pow};
 use crate::viewing::{Eotf, Primaries, Viewing};
 use multiversion::multiversion;
@@ -217,17 +218,27 @@ pub(crate) fn opponent_row(photometry: &Photometry, codes: &[[f32; 3]], planes: 
     }
 }
 
-/// Converts a row of grey code values to the achromatic channel.
+/// Converts grey code values, those of a picture and a share of its residual, to the achromatic channel.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-pub(crate) fn grey_row(photometry: &Photometry, codes: &mut [f32]) {
+pub(crate) fn greys(
+    photometry: &Photometry,
+    picture: &[f32],
+    (share, residual): (f32, &[f32]),
+    light: &mut [f32],
+) {
     let [r, g, b] = photometry.to_opponent[0];
     let white = r + g + b;
-    match photometry.curve {
-        Curve::Srgb => photometry.emit(codes, srgb),
-        // Curves that hardly anybody asks for
-        _ => codes.iter_mut().for_each(|code| *code = photometry.light([*code; 3])[1]),
+    let (range, floor) = (photometry.peak - photometry.black, photometry.black + photometry.reflected);
+    if let Curve::Srgb = photometry.curve {
+        map_rows([picture, residual], [light], |[picture, residual]| {
+            [(range * srgb(unit(picture + share * residual)) + floor) * white]
+        });
+        return;
     }
-    codes.iter_mut().for_each(|light| *light *= white);
+    // Curves that hardly anybody asks for
+    for ((light, picture), residual) in light.iter_mut().zip(picture).zip(residual) {
+        *light = photometry.light([picture + share * residual; 3])[1] * white;
+    }
 }
 
 #[cfg(test)]
@@ -279,8 +290,8 @@ mod tests {
         let luminance = viewing("desk").luminance(0.6) as f32;
         assert!((achromatic / luminance - 1.0).abs() < 0.1, "{achromatic} for {luminance}");
         assert!(red.abs() < 0.02 * luminance && violet.abs() < 0.02 * luminance, "{red}, {violet}");
-        let mut grey = [0.6];
-        grey_row(&photometry, &mut grey);
+        let mut grey = [0.0];
+        greys(&photometry, &[0.5], (-0.5, &[-0.2]), &mut grey);
         assert!((grey[0] / achromatic - 1.0).abs() < 1e-6);
     }
 

@@ -266,7 +266,7 @@ fn load(
                 check_values(values, size)?;
             }
             for (of, share) in SHARES.into_iter().enumerate() {
-                engine.load_grey(of, size, workspace, |i| picture[i] + share * residual[i]);
+                engine.load_grey(of, size, workspace, picture, (share, residual));
             }
         }
     }
@@ -288,8 +288,8 @@ fn differ<const N: usize>(
     build::<N>(sizes, engine.film.is_some(), workspace);
     for band in bands {
         let wanted = part.at(band).wider(MARGIN, sizes[band]);
-        let around = wanted.wider(BLUR_RADIUS, sizes[band]);
-        engine.band::<N>(band, sizes[band], (around, wanted), Adapted::ToBoth, workspace);
+        let rows = (wanted.wider(BLUR_RADIUS, sizes[band]).rows(), wanted.rows());
+        engine.band::<N>(band, sizes[band], rows, Adapted::ToBoth, workspace);
     }
 }
 
@@ -302,7 +302,7 @@ fn draw<const N: usize>(
     (growth, scale): (f32, f32),
     workspace: &mut VisionWorkspace,
 ) {
-    let VisionWorkspace { differences, map, rows, .. } = workspace;
+    let VisionWorkspace { differences, map, strip, .. } = workspace;
     let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]);
     for band in bands.clone() {
         // The pyramid halves contrasts between its finest and its coarsest band
@@ -316,7 +316,7 @@ fn draw<const N: usize>(
             across_row(planes, transient, growth, weight, &mut map[band][here]);
         }
     }
-    collapse(map, bands, sizes, |band| parts(band).rows(), &mut rows.narrow, &mut rows.places);
+    collapse(map, bands, sizes, |band| parts(band).rows(), &mut strip.narrow, &mut strip.places);
 }
 
 #[cfg(test)]

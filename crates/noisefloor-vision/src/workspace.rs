@@ -1,6 +1,6 @@
 //! Memory for pictures of a size, used again for the next one.
 
-use crate::masking::BLUR_RADIUS;
+use crate::masking::{BLUR_RADIUS, MaskScratch};
 use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
 use crate::temporal::{ALL_CHANNELS, TRANSIENT};
@@ -22,7 +22,7 @@ pub struct VisionWorkspace {
     pub(crate) smaller: [Vec<f32>; CHANNELS],
     /// The map: by band.
     pub(crate) map: Vec<Vec<f32>>,
-    pub(crate) rows: Rows,
+    pub(crate) strip: Strip,
 }
 
 /// Sizes of the levels of a pyramid, finest first.
@@ -53,16 +53,23 @@ impl Deref for Sizes {
     }
 }
 
-/// Rows of the finest level.
+/// Pixels of the rows that are worked on together, where a row has no more: few enough to stay in the nearest caches.
+/// Each step of the work is a loop, which the processor needs some time to begin and to end.
+pub(crate) const STRIP: usize = 1024;
+
+/// Rows that are worked on together.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rows {
-    pub(crate) codes: Vec<[f32; 3]>,
-    pub(crate) narrow: Vec<f32>,
+pub(crate) struct Strip {
     pub(crate) coarse: [[Vec<f32>; CHANNELS]; 2],
     pub(crate) flicker: Vec<f32>,
     pub(crate) mean: Vec<f32>,
     pub(crate) places: Vec<f32>,
     pub(crate) sensitivity: Vec<f32>,
+    pub(crate) sharp: Vec<f32>,
+    pub(crate) mask: Box<MaskScratch>,
+    /// Single rows.
+    pub(crate) codes: Vec<[f32; 3]>,
+    pub(crate) narrow: Vec<f32>,
     pub(crate) padded: Vec<f32>,
 }
 
@@ -90,15 +97,16 @@ impl VisionWorkspace {
         }
         self.smaller[..channels].iter_mut().for_each(|plane| reserve(plane, size.area()));
         let width = size.width;
-        let Rows { codes, narrow, coarse, flicker, mean, places, sensitivity, padded } = &mut self.rows;
+        let Strip { codes, narrow, coarse, flicker, mean, places, sensitivity, sharp, padded, .. } =
+            &mut self.strip;
         if codes.len() < width {
             codes.resize(width, [0.0; 3]);
         }
         coarse
             .iter_mut()
             .flatten()
-            .chain([flicker, mean, places, sensitivity])
-            .for_each(|row| reserve(row, width));
+            .chain([flicker, mean, places, sensitivity, sharp])
+            .for_each(|rows| reserve(rows, width.max(STRIP)));
         reserve(narrow, width + 4);
         reserve(padded, width + 2 * BLUR_RADIUS);
         sizes

@@ -296,21 +296,36 @@ impl Display {
 /// processors agree to the bit.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn luma_row(display: &Display, linear: &[Rgb], shown: &mut [f32]) {
-    if let Curve::Custom(_) = display.curve {
-        shown.iter_mut().zip(linear).for_each(|(shown, &pixel)| *shown = display.luma(pixel));
-        return;
-    }
-    // Channel by channel, as vector instructions want it; few enough to stay in the nearest cache
+    // Few enough to stay in the nearest cache
     const PIXELS: usize = 128;
     let mut channels = [[0.0; PIXELS]; 3];
     for (linear, shown) in linear.chunks(PIXELS).zip(shown.chunks_mut(PIXELS)) {
-        let [r, g, b] = channels.each_mut().map(|channel| &mut channel[..shown.len()]);
-        for (((pixel, r), g), b) in linear.iter().zip(&mut *r).zip(&mut *g).zip(&mut *b) {
-            [*r, *g, *b] = *pixel;
-        }
-        for (((shown, r), g), b) in shown.iter_mut().zip(r).zip(g).zip(b) {
-            *shown = luminance(display.encode_plain([*r, *g, *b]));
-        }
+        split_channels(linear, &mut channels);
+        luma_of_channels(display, channels.each_ref().map(|channel| &channel[..shown.len()]), shown);
+    }
+}
+
+/// The channels of pixels, each by itself, as vector instructions want them.
+///
+/// Inlined as the next, to be compiled for the vector instructions of whoever calls it.
+#[inline(always)]
+pub(crate) fn split_channels<const PIXELS: usize>(pixels: &[Rgb], channels: &mut [[f32; PIXELS]; 3]) {
+    let [r, g, b] = channels.each_mut().map(|channel| &mut channel[..pixels.len()]);
+    for (((pixel, r), g), b) in pixels.iter().zip(r).zip(g).zip(b) {
+        [*r, *g, *b] = *pixel;
+    }
+}
+
+/// [`Display::luma`] of pixels whose channels are as long as `shown`.
+#[inline(always)]
+pub(crate) fn luma_of_channels(display: &Display, [r, g, b]: [&[f32]; 3], shown: &mut [f32]) {
+    let pixels = shown.iter_mut().zip(r).zip(g).zip(b);
+    if let Curve::Custom(_) = display.curve {
+        pixels.for_each(|(((shown, r), g), b)| *shown = display.luma([*r, *g, *b]));
+        return;
+    }
+    for (((shown, r), g), b) in pixels {
+        *shown = luminance(display.encode_plain([*r, *g, *b]));
     }
 }
 

@@ -178,7 +178,7 @@ pub(crate) fn blend_row([a, b]: [&[Rgb]; 2], weights: [f32; 2], mean: &mut [Rgb]
 
 /// [`blend_row`] of one number.
 #[inline(always)]
-fn blend([a, b]: [f32; 2], [of_a, of_b]: [f32; 2]) -> f32 {
+pub(crate) fn blend([a, b]: [f32; 2], [of_a, of_b]: [f32; 2]) -> f32 {
     let (low, high, of_high) = if a < b { (a, b, of_b) } else { (b, a, of_a) };
     let near = low + (high - low) * of_high;
     // The difference of two huge values may be none

@@ -4,7 +4,7 @@
 use crate::container;
 use crate::criterion::{CriterionError, ExpectedThreshold, Needs, StoppingCriterion, Verdict, View};
 use crate::descriptor::{Described, DescriptorError};
-use crate::evidence::{Evidence, TilePlanes};
+use crate::evidence::{Evidence, Shown, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
 use crate::params::Audience;
 use crate::tile::{Tile, TileGrid};
@@ -38,6 +38,9 @@ const EVEN: f32 = 1.0 / 32.0;
 
 /// How many pixels that has to be at least: the energy of their noise is then known to about a sixth.
 const CARRIERS: f64 = 32.0;
+
+/// How many tiles beside each other are shown together, at most: more would leave threads without work.
+const SHOWN_TOGETHER: usize = 4;
 
 /// How many times the light that a tile has been found to lack unseen is looked at again.
 const MORE: f64 = 1.25;
@@ -219,14 +222,21 @@ impl Oracle {
         Some(high.exp2())
     }
 
-    /// What a tile is judged by; `None` if too many of its pixels have no evidence.
-    fn planes(&self, view: &View<'_>, tile: Tile) -> Result<Option<TilePlanes>, CriterionError> {
+    /// What a tile is judged by, alone or of several that are shown together; `None` if too many of its pixels have no
+    /// evidence.
+    fn planes(
+        &self,
+        view: &View<'_>,
+        shown: Option<&Shown>,
+        tile: Tile,
+    ) -> Result<Option<TilePlanes>, CriterionError> {
         if view.film.unsampled_pixels(tile.index) > tile.pixels() / NO_EVIDENCE {
             return Ok(None);
         }
-        let planes = match self.model.evidence() {
-            Evidence::Halves => TilePlanes::from_halves(view.film, view.display, tile),
-            Evidence::Reference => {
+        let planes = match (self.model.evidence(), shown) {
+            (Evidence::Halves, Some(shown)) => shown.planes(tile),
+            (Evidence::Halves, None) => TilePlanes::from_halves(view.film, view.display, tile),
+            (Evidence::Reference, _) => {
                 let reference = view.reference.ok_or_else(|| CriterionError::NoReference(self.name()))?;
                 TilePlanes::from_reference(view.film, view.display, reference, tile)
             }
@@ -234,9 +244,31 @@ impl Oracle {
         Ok(Some(TilePlanes { viewing: view.viewing, ..planes }))
     }
 
-    /// What a tile is like now; `None` if too many of its pixels have no evidence.
-    fn look_at(&self, view: &View<'_>, tile: Tile) -> Result<Option<LastDescribed>, CriterionError> {
-        let Some(planes) = self.planes(view, tile)? else { return Ok(None) };
+    /// What tiles are like now, which are in the order of the grid; `None` for one of which too many pixels have no
+    /// evidence.
+    fn look_at(&self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Option<LastDescribed>>, CriterionError> {
+        let beside = |a: &Tile, b: &Tile| a.y == b.y && a.index + 1 == b.index;
+        let runs: Vec<&[Tile]> = tiles.chunk_by(beside).flat_map(|run| run.chunks(SHOWN_TOGETHER)).collect();
+        let look_at_run = |run: &&[Tile]| {
+            let of_halves = self.model.evidence() == Evidence::Halves;
+            let shown = of_halves.then(|| Shown::of_halves(view.film, view.display, run));
+            let seen: Result<Vec<_>, _> =
+                run.iter().map(|&tile| self.look_at_one(view, shown.as_ref(), tile)).collect();
+            shown.into_iter().for_each(Shown::recycle);
+            seen
+        };
+        let seen: Vec<Vec<Option<LastDescribed>>> =
+            runs.par_iter().map(look_at_run).collect::<Result<_, _>>()?;
+        Ok(seen.into_iter().flatten().collect())
+    }
+
+    fn look_at_one(
+        &self,
+        view: &View<'_>,
+        shown: Option<&Shown>,
+        tile: Tile,
+    ) -> Result<Option<LastDescribed>, CriterionError> {
+        let Some(planes) = self.planes(view, shown, tile)? else { return Ok(None) };
         let described = self.describe_tile(&planes, view.film.spp(tile.index) as f64);
         let spread = planes.noise_spread();
         planes.recycle();
@@ -264,7 +296,7 @@ impl Oracle {
         let unmet = Unmet::new(view.film.grid(), met_once(seen), view.viewing);
         let lit = |tile: Tile| {
             let Some(shown) = unmet.shown(view.film, view.display, tile) else { return Ok(None) };
-            let Some(planes) = self.planes(view, tile)? else { return Ok(None) };
+            let Some(planes) = self.planes(view, None, tile)? else { return Ok(None) };
             self.with_light(planes, shown, view.film.spp(tile.index) as f64).map(Some)
         };
         let by_noise = judge(&described);
@@ -536,8 +568,7 @@ impl StoppingCriterion for Oracle {
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
         let tiles: Vec<Tile> = view.film.grid().tiles().collect();
-        let seen: Vec<Option<LastDescribed>> =
-            tiles.par_iter().map(|&tile| self.look_at(view, tile).ok().flatten()).collect();
+        let seen = self.look_at(view, &tiles).ok()?;
         let Judged { described, .. } = self.judge_seen(view, &seen, &tiles).ok()?;
         let audience = self.audience().then(view.audience);
         let described: Vec<Described> = described.into_iter().flatten().collect();
@@ -553,14 +584,15 @@ impl StoppingCriterion for Oracle {
         }
         let mut due = vec![false; grid.len()];
         tiles.iter().for_each(|t| due[t.index] = true);
-        let this: &Self = self;
-        let describe = |tile: Tile| {
-            let spp = view.film.spp(tile.index) as f64;
-            let known = this.described[tile.index].as_ref().filter(|d| d.tile.spp == spp && !due[tile.index]);
-            if known.is_some() { Ok(known.cloned()) } else { this.look_at(view, tile) }
-        };
         let all: Vec<Tile> = grid.tiles().collect();
-        self.described = all.par_iter().map(|&tile| describe(tile)).collect::<Result<_, _>>()?;
+        let changed = |tile: &Tile| {
+            let spp = view.film.spp(tile.index) as f64;
+            due[tile.index] || self.described[tile.index].as_ref().is_none_or(|d| d.tile.spp != spp)
+        };
+        let changed: Vec<Tile> = all.iter().copied().filter(changed).collect();
+        for (tile, seen) in changed.iter().zip(self.look_at(view, &changed)?) {
+            self.described[tile.index] = seen;
+        }
 
         // Tiles that were called converged without what has been met elsewhere since are judged again
         let unmet = Unmet::new(grid, met_once(&self.described), view.viewing);

@@ -68,28 +68,21 @@ impl NoiseMask {
         if width == 0 || height == 0 {
             return out;
         }
-        let mut column = vec![0.0; width];
+        let (weights, mut column) = (self.weights(), vec![0.0; width]);
         for (y, target) in out.values_mut().chunks_exact_mut(width).enumerate() {
             let around = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| plane.row(y));
-            self.apply_to_row(around, &mut column, target);
+            mask_row(weights, around, &mut column, target);
         }
         out
     }
-
-    /// The mask of one row of a plane, `here`, which is not empty, into `out`; `column` is room for as many
-    /// numbers.
-    pub(crate) fn apply_to_row(self, [above, here, below]: [&[f32]; 3], column: &mut [f32], out: &mut [f32]) {
-        mask_row(self.weights(), above, here, below, column, out);
-    }
 }
 
-/// Blurs along columns into one row, then along that row, and takes the blur off.
+/// The mask of one row of a plane, `here`, which is not empty, into `out`, by the weights of [`NoiseMask::weights`]: blurs along
+/// columns into `column`, which has room for as many numbers, then along that, and takes the blur off.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-fn mask_row(
+pub(super) fn mask_row(
     (n, c): (f32, f32),
-    above: &[f32],
-    here: &[f32],
-    below: &[f32],
+    [above, here, below]: [&[f32]; 3],
     column: &mut [f32],
     out: &mut [f32],
 ) {

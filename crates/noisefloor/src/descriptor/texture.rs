@@ -1,5 +1,6 @@
 //! How much texture a tile has, beside its noise: which tiles a model has been tried on is told by it.
 
+use super::mask::mask_row;
 use crate::descriptor::NoiseMask;
 use crate::{
     display::ROUNDING_LUMINANCE,
@@ -83,13 +84,14 @@ fn energies(
     halve(width / 4, quarter, eighth);
     column.resize(width, 0.0);
     row.resize(width, 0.0);
+    let weights = mask.weights();
     for (scale, (level, out)) in [plane, half, quarter, eighth].into_iter().zip(out).enumerate() {
         let (width, edge) = (width >> scale, BLOCK >> scale);
         let row = &mut row[..width];
         block_means([width, level.len() / width], edge, sums, rough, |y, sums| {
             // The halo is not summed: there are rows above and below
             let around = [y - 1, y, y + 1].map(|y| &level[y * width..(y + 1) * width]);
-            mask.apply_to_row(around, column, row);
+            mask_row(weights, around, column, row);
             sums.iter_mut().zip(&*row).for_each(|(sum, &value)| *sum += value * value);
         });
         let known = mask.white_noise_gain() * rounding / (1 << (2 * scale)) as f32;

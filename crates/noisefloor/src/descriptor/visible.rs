@@ -320,7 +320,7 @@ fn without_rounding(planes: &TilePlanes) -> f64 {
     if known == 0.0 {
         return 1.0;
     }
-    let squares = planes.residual.inside(planes.inner).fold(0.0, |sum, v| sum + f64::from(v) * f64::from(v));
+    let [squares] = planes.residual.sums_inside(planes.inner, |v| [v * v]);
     (1.0 - known * planes.inner.pixels() as f64 / squares.max(f64::MIN_POSITIVE)).max(0.0).sqrt()
 }
 
@@ -336,8 +336,8 @@ fn noise_number(amplitude: f64) -> f32 {
 
 /// The mean logarithm of the tile's light, as a share of that of white.
 fn light(planes: &TilePlanes) -> f32 {
-    let mean = planes.image.inside(planes.inner).fold(0.0, |sum, luma| sum + f64::from(luma))
-        / planes.inner.pixels() as f64;
+    let [sum] = planes.image.sums_inside(planes.inner, |luma| [luma]);
+    let mean = sum / planes.inner.pixels() as f64;
     ((mean as f32).clamp(0.0, 1.0).powf(GAMMA) + LIGHT_FLOOR).ln()
 }
 
