@@ -294,6 +294,10 @@ typedef struct {
     // follow the threshold, and at most 1.41 times that where they do not. 0 if it is not known: then only pictures that were
     // rendered speak for a setting.
     double alone;
+    // Not 0 if nearly all noise is of pixels that have the fewest samples that the renderer takes: a finer threshold changes
+    // nothing until others have more, and the search takes a larger step. Where alone is 1.41 times the ratio, that is known
+    // without. nf_excess cannot know, and says 0.
+    uint32_t still;
 } NfExcess;
 
 #ifdef __cplusplus

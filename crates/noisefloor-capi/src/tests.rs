@@ -12,7 +12,7 @@ use crate::status::*;
 use crate::tone::*;
 use crate::tune::*;
 use noisefloor::display::{ToneTable, parse_cube};
-use noisefloor::tune::PicturePair;
+use noisefloor::tune::{Ending, Excess, Knob, Next, PicturePair, Tuning};
 use noisefloor::{Oracle, Params, Rgb, Session, Tile, ToneMapping, criterion::CriterionError};
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
@@ -821,6 +821,45 @@ fn messages_belong_to_their_thread() {
     assert_eq!(message(), "here?!");
     // SAFETY: text of this library.
     assert_eq!(unsafe { CStr::from_ptr(nf_version()) }.to_str(), Ok(env!("CARGO_PKG_VERSION")));
+}
+
+/// The settings that a search of C asks for are those of Rust's, told the same. Down to a threshold of 0.02, all pixels have the
+/// fewest samples, and nothing falls.
+#[test]
+fn what_is_known_of_one_picture_is_told() {
+    let searched = |known: bool, still: u32| {
+        let mut rust = Tuning::new(Knob::Threshold { coarsest: 0.2, finest: 0.0001 }).unwrap();
+        let (mut tuning, mut step) = (null_mut(), NfTuningStep::default());
+        let mut asked = Vec::new();
+        // SAFETY: living handles.
+        unsafe {
+            assert_eq!(nf_tuning_of_threshold(0.2, 0.0001, &mut tuning), NfStatus::Ok);
+            loop {
+                assert_eq!(nf_tuning_next(tuning, &mut step), NfStatus::Ok);
+                let Next::Render { each, .. } = rust.next() else { break };
+                assert_eq!((step.ending, step.each), (NF_TUNING_SEARCHING, each));
+                asked.push(each);
+                let ratio = 1.5 * each.min(0.02) / 0.02;
+                let alone = if known { ratio } else { 0.0 };
+                let told = NfExcess { ratio, alone, still, pictures: each.to_bits(), ..NfExcess::default() };
+                assert_eq!(nf_tuning_tell(tuning, told), NfStatus::Ok);
+                let told = Excess::new(ratio).of_pictures(each.to_bits()).with_still(still != 0);
+                rust.tell(told.with_alone(known.then_some(ratio)));
+            }
+            assert_eq!(nf_tuning_free(tuning), NfStatus::Ok);
+        }
+        let Next::Done(ending) = rust.next() else { panic!("{:?}", rust.next()) };
+        (asked, step.ending, ending)
+    };
+    // What follows the threshold, and does not fall, is never going to; what stands still is passed by a leap
+    let (follows, stands) = (searched(true, 0), searched(true, 7));
+    assert!(
+        matches!((follows.1, follows.2), (NF_TUNING_NOT_FALLING, Ending::NotFalling { .. })),
+        "{follows:?}"
+    );
+    assert!(matches!((stands.1, stands.2), (NF_TUNING_FOUND, Ending::Found { .. })), "{stands:?}");
+    assert_ne!(follows.0[..2], stands.0[..2]);
+    assert_ne!(searched(false, 0).0, searched(false, 1).0);
 }
 
 /// A renderer whose noise is in proportion to its threshold, and a denoiser that removes nine tenths of it.

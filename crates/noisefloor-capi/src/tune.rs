@@ -64,6 +64,10 @@ pub struct NfExcess {
     /// follow the threshold, and at most 1.41 times that where they do not. 0 if it is not known: then only pictures that were
     /// rendered speak for a setting.
     pub alone: f64,
+    /// Not 0 if nearly all noise is of pixels that have the fewest samples that the renderer takes: a finer threshold changes
+    /// nothing until others have more, and the search takes a larger step. Where alone is 1.41 times the ratio, that is known
+    /// without. nf_excess cannot know, and says 0.
+    pub still: u32,
 }
 
 impl From<KnobError> for Failure {
@@ -132,7 +136,7 @@ pub unsafe extern "C" fn nf_tuning_next(tuning: *const NfTuning, step: *mut NfTu
 #[unsafe(no_mangle)]
 pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> NfStatus {
     guard(|| {
-        let NfExcess { ratio, x, y, pictures, alone } = excess;
+        let NfExcess { ratio, x, y, pictures, alone, still } = excess;
         for (name, value) in [("ratio", ratio), ("alone", alone)] {
             if value.is_nan() || value < 0.0 {
                 let what = "0 or more, or infinite where it cannot be told";
@@ -150,7 +154,8 @@ pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> N
             let what = "nf_tuning_tell answers nf_tuning_next, once; after the end there is nothing to tell";
             return Err(Failure::new(NfStatus::Argument, what.to_owned()));
         }
-        asked.tuning.tell(Excess::new(ratio).at(place).of_pictures(pictures).with_alone(alone));
+        let told = Excess::new(ratio).at(place).of_pictures(pictures).with_alone(alone);
+        asked.tuning.tell(told.with_still(still != 0));
         Ok(())
     })
 }
@@ -288,9 +293,10 @@ unsafe fn pictures<const N: usize>(
 /// # Safety
 /// As [`border::write`].
 unsafe fn write(place: *mut NfExcess, excess: Excess) -> Result<(), Failure> {
-    let Excess { ratio, place: at, pictures, alone, .. } = excess;
+    let Excess { ratio, place: at, pictures, alone, still, .. } = excess;
     let (x, y) = at.unwrap_or_default();
-    let alone = alone.unwrap_or(0.0);
+    let (alone, still) = (alone.unwrap_or(0.0), still.into());
+    let found = NfExcess { ratio, x: x as u32, y: y as u32, pictures, alone, still };
     // SAFETY: as for this function.
-    unsafe { border::write(place, NfExcess { ratio, x: x as u32, y: y as u32, pictures, alone }, "excess") }
+    unsafe { border::write(place, found, "excess") }
 }
