@@ -4,7 +4,8 @@
     python3 benchmarks/gpu.py [--sizes 1920x1080,3840x2160] [--renderers cuda,cornell] [--tile 64] [--limit 2048]
 
 Needs a machine with an NVIDIA card, the module `noisefloor`, and CuPy (`cuda`) or Mitsuba 3 (`cornell`, or the path of a
-scene of Mitsuba). `--renderers numpy` needs no card: it makes noise on the processor, to try the script.
+scene of Mitsuba). `--renderers paced` needs no card: it takes time, but no processor until a picture is fetched, which is light
+with noise that nobody could overlook, so that all tiles stop at the limit.
 
 The first table has what a pass takes: rendering 16 samples of each pixel, copying them from the card, pushing and judging
 them, in a loop that does one after the other. The second has wall times. Each renderer and size is rendered until all tiles
@@ -25,6 +26,8 @@ import noisefloor
 AT_ONCE, PASS = 4, 16
 # Seconds after which the first table has seen enough passes.
 ENOUGH = 8
+# Seconds for a sample of a pixel without a card, a millisecond for all of 1920×1080, and its noise.
+PACE, NOISE = 1e-3 / (1920 * 1080), 3
 
 # A room of two walls, a floor and a ball under a lamp and a sky: as little work for each sample as a path tracer can
 # have, so that the oracle has the least time.
@@ -77,13 +80,21 @@ extern "C" __global__ void trace(float *mean, int width, int height, int spp, un
 
 
 def renderer(kind, width, height):
-    """A function of (spp, seed) that returns an array on the device when it is done; `fetch` of it brings one to memory."""
-    if kind == "numpy":
-        light = 0.2 + np.abs(np.sin(np.arange(width) / 97))[None, :, None] * np.ones((height, 1, 3))
+    """A function of (spp, seed) that returns an array on the device when it is done; `fetch` of it brings one to memory, and
+    is told its samples."""
+    if kind == "paced":
+        pixels = width * height
+        light = (0.5 + np.abs(np.sin(np.arange(width) / 97)))[None, :, None].astype(np.float32)
+        noise = np.random.default_rng(63).standard_normal(3 * pixels + 2**20, np.float32)
+        image, starts = np.empty((height, width, 3), np.float32), itertools.count(100_003, 100_003)
         def render(spp, seed):
-            noise = np.random.default_rng(seed).standard_normal((height, width, 3), np.float32)
-            return (light * (1 + 0.2 * noise / np.sqrt(spp))).astype(np.float32)
-        render.fetch = np.asarray
+            time.sleep(PACE * spp * pixels)
+            return np.zeros((), np.float32)
+        def fetch(_, spp):
+            first = next(starts) % 2**20
+            np.multiply(noise[first:first + 3 * pixels].reshape(image.shape), NOISE / spp**0.5, out=image)
+            return np.add(image, light, out=image)
+        render.fetch = fetch
         return render
     if kind == "cuda":
         import cupy
@@ -97,7 +108,7 @@ def renderer(kind, width, height):
             return mean
         # Memory that is pinned, and the same every time: a card writes into fresh memory at a tenth of the speed
         pinned = cupyx.empty_pinned((height, width, 3), np.float32)
-        render.fetch = lambda image: image.get(out=pinned)
+        render.fetch = lambda image, spp: image.get(out=pinned)
         return render
     import drjit
     import mitsuba
@@ -116,7 +127,7 @@ def renderer(kind, width, height):
     def evaluate(image):
         drjit.eval(image)
         drjit.sync_thread()
-    render.evaluate, render.fetch = evaluate, np.asarray
+    render.evaluate, render.fetch = evaluate, lambda image, spp: np.asarray(image)
     return render
 
 
@@ -143,7 +154,7 @@ class Sums:
     def take(self):
         spp, mean = self.spp, self.sum / self.spp
         self.spp, self.sum = 0, None
-        return spp, self.render.fetch(mean)
+        return spp, self.render.fetch(mean, spp)
 
 
 def parts(render, judged, limit):
@@ -156,7 +167,7 @@ def parts(render, judged, limit):
         if hasattr(render, "evaluate"):
             render.evaluate(image)
         marks.append(time.perf_counter())
-        image = np.ascontiguousarray(render.fetch(image), np.float32)
+        image = np.ascontiguousarray(render.fetch(image, PASS), np.float32)
         marks.append(time.perf_counter())
         judged.push_image(PASS, image)
         marks.append(time.perf_counter())
@@ -189,11 +200,14 @@ def waiting(render, judged):
 def background(render, judged):
     sums, start = Sums(render), time.perf_counter()
     with noisefloor.Background(judged, waiting=1) as beside:
-        while not beside.done:
-            sums.add()
-            if sums.spp >= (beside.next_pass or 0) and not beside.pending:
+        while wanted := beside.next_pass:
+            if sums.spp >= wanted and not beside.pending:
                 beside.push_image(*sums.take())
                 beside.judge()
+            if sums.spp < beside.spp_left:
+                sums.add()
+            else:
+                beside.finish()
         stopped = time.perf_counter() - start
     return stopped, sums.calls
 

@@ -226,6 +226,10 @@ typedef struct {
     size_t pending;
     // Samples per pixel that the next pass over the whole picture should have; 0 when all tiles are done.
     uint64_t next_pass;
+    // Samples per pixel that open tiles can still get before they stop at max_spp, beside all that was handed over. A renderer that
+    // has summed up as many waits for the verdict, by nf_background_finish: what it would render meanwhile is beyond the stop. 0
+    // when all tiles are done, or will be with the passes that are pending, as far as is known.
+    uint64_t spp_left;
     // Open tiles, after the last pass that was judged.
     size_t open_tiles;
     // Stops so far. A tile that was open again counts twice.

@@ -26,6 +26,12 @@ export class BackgroundSession {
   readonly pending: number;
   /** As of the last pass that was judged: samples per pixel at which a tile wants the next push. */
   readonly nextSpp: number;
+  /**
+   * Samples per pixel that open tiles can still get before they stop at `maxSpp`, beside all that was handed over. A page
+   * that has rendered as many waits for the verdict, by `finish()`: what it would render meanwhile is beyond the stop. 0
+   * when all tiles are done, or will be with the passes that are pending, as far as is known.
+   */
+  readonly sppLeft: number;
   /** As of the last pass that was judged. */
   readonly isDone: boolean;
   /** Where all tiles stand, as of the last pass that was judged. */

@@ -42,8 +42,8 @@ export class BackgroundSession {
   #merges;
   #onWarning;
   #state = { nextSpp: Infinity, isDone: false, states: [], warnings: [] };
-  /** Passes in the worker, and the one that waits for room in it. */
-  #passes = 0;
+  /** Passes in the worker, the first first, without their pixels, and the one that waits for room in it. */
+  #sent = [];
   #held = null;
   #failed = null;
   /** Whoever waits: for room, or for answers by their number. */
@@ -79,7 +79,20 @@ export class BackgroundSession {
   }
 
   get pending() {
-    return this.#passes + (this.#held ? 1 : 0);
+    return this.#sent.length + (this.#held ? 1 : 0);
+  }
+
+  get sppLeft() {
+    const passes = this.#held ? [...this.#sent, this.#held] : this.#sent;
+    const after = (had, { running, spp }) => (running ? Math.max(had, spp) : had + spp);
+    const lefts = this.states
+      .filter(({ reason }) => reason === "open")
+      .map(({ tile, spp }) => {
+        const ofTile = passes.filter((pass) => pass.tile === undefined || pass.tile === tile.index);
+        return this.#state.maxSpp - ofTile.reduce(after, spp);
+      });
+    // A tile that has as many and is open is so for a reason: one of its halves may be empty
+    return Math.max(passes.length || this.isDone ? 0 : 1, ...lefts);
   }
 
   get nextSpp() {
@@ -120,21 +133,22 @@ export class BackgroundSession {
       this.#keep((this.#held.pixels === before.pixels ? pass : before).pixels);
       return;
     }
-    if (this.#merges && !this.#held && this.#passes > this.#waiting) {
+    if (this.#merges && !this.#held && this.#sent.length > this.#waiting) {
       this.#held = pass;
       return;
     }
     this.#send(pass);
-    await this.#until(() => this.#passes <= this.#waiting);
+    await this.#until(() => this.#sent.length <= this.#waiting);
   }
 
   #send(pass) {
-    this.#passes++;
+    const { tile, running, spp } = pass;
+    this.#sent.push({ tile, running, spp });
     this.#worker.postMessage({ pass }, [pass.pixels.buffer]);
   }
 
   async finish() {
-    await this.#until(() => this.#passes === 0);
+    await this.#until(() => this.pending === 0);
     return this.states;
   }
 
@@ -184,9 +198,9 @@ export class BackgroundSession {
     } else if (failure) {
       this.#fail(failure);
     } else {
-      this.#passes--;
+      this.#sent.shift();
       this.#keep(pixels);
-      if (this.#held && this.#passes <= this.#waiting) {
+      if (this.#held && this.#sent.length <= this.#waiting) {
         this.#send(this.#held);
         this.#held = null;
       }

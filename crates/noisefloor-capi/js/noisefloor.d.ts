@@ -183,6 +183,8 @@ export class Session {
   readonly width: number;
   readonly height: number;
   readonly tiles: readonly Tile[];
+  /** Samples per pixel at which every tile stops. */
+  readonly maxSpp: number;
   /** What the open tiles need next. */
   requests(): Request[];
   /**

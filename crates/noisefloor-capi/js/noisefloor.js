@@ -454,6 +454,7 @@ export class Session {
       withMemory(shape.size, (params) => {
         call("nf_params_default", params);
         writeStruct("NfParams", params, fields(options));
+        this.maxSpp = readStruct("NfParams", params).max_spp;
         const make = (place) => call("nf_session_new", ...size, oracle, params, place);
         if (options.viewing === undefined) return out("size_t", make);
         return withText(options.viewing, (viewing) => {

@@ -7,8 +7,8 @@ let session;
 let fresh = [];
 
 function stateOf() {
-  const { nextSpp, isDone } = session;
-  return { nextSpp, isDone, states: session.states(), warnings: session.warnings(), fresh: fresh.splice(0) };
+  const { nextSpp, maxSpp, isDone } = session;
+  return { nextSpp, maxSpp, isDone, states: session.states(), warnings: session.warnings(), fresh: fresh.splice(0) };
 }
 
 async function answer({ open, pass, call, values = [] }) {

@@ -43,6 +43,10 @@ pub struct NfBackgroundState {
     pub pending: usize,
     /// Samples per pixel that the next pass over the whole picture should have; 0 when all tiles are done.
     pub next_pass: u64,
+    /// Samples per pixel that open tiles can still get before they stop at max_spp, beside all that was handed over. A renderer that
+    /// has summed up as many waits for the verdict, by nf_background_finish: what it would render meanwhile is beyond the stop. 0
+    /// when all tiles are done, or will be with the passes that are pending, as far as is known.
+    pub spp_left: u64,
     /// Open tiles, after the last pass that was judged.
     pub open_tiles: usize,
     /// Stops so far. A tile that was open again counts twice.
@@ -200,6 +204,7 @@ pub unsafe extern "C" fn nf_background_state(
             judged,
             pending: lent.background.pending(),
             next_pass: lent.background.next_pass().unwrap_or(0),
+            spp_left: lent.background.spp_left(),
             open_tiles: lent.background.requests().len(),
             stops: stopped,
             warnings: warnings.len(),

@@ -159,6 +159,14 @@ impl PyBackground {
         Ok(self.here()?.next_pass())
     }
 
+    /// Samples per pixel that open tiles can still get before they stop at Params.max_spp, beside all that was handed over. Does
+    /// not wait. A renderer that has summed up as many waits for the verdict, by finish(): what it would render meanwhile is
+    /// beyond the stop. 0 when all tiles are done, or will be with the passes that are pending, as far as is known.
+    #[getter]
+    fn spp_left(&self) -> PyResult<u64> {
+        Ok(self.here()?.spp_left())
+    }
+
     /// Whether every tile is done, by the passes that were judged. Does not wait.
     #[getter]
     fn done(&self) -> PyResult<bool> {

@@ -310,6 +310,25 @@ class Backgrounds(unittest.TestCase):
             total = total + image.astype(np.float64)
             yield 16 * k, (total / k).astype(np.float32)
 
+    def test_whoever_asks_renders_nothing_beyond_the_limit(self):
+        params = nf.Params(tile=32, max_spp=200, schedule="growing", step=16)
+        images = self.passes(100, spp=1)
+        summed = handed = 0
+        with nf.Background(nf.Session(96, 80, params=params, linear=True)) as background:
+            while wanted := background.next_pass:
+                if summed >= wanted and not background.pending:
+                    background.push_image(summed, next(images))
+                    background.judge()
+                    handed, summed = handed + summed, 0
+                # No tile stops before, judged or not
+                self.assertEqual(background.spp_left, 200 - handed)
+                if summed < background.spp_left:
+                    summed += 4
+                else:
+                    background.finish()
+            self.assertEqual((background.spp_left, handed, summed), (0, 200, 0))
+            self.assertEqual({stop.reason for stop in background.end().stops()}, {"max-spp"})
+
     def test_it_ends_with_its_block(self):
         session = nf.Session(96, 80, params=PARAMS)
         with nf.Background(session, when_full="merge") as background:

@@ -15,14 +15,18 @@
 //! let background = Background::new(session, 2, WhenFull::Wait)?;
 //! let mut spp = 0;
 //! while let Some(wanted) = background.next_pass() {
-//!     spp += 4; // your renderer: four more samples of each pixel, summed up on the GPU
 //!     if spp >= wanted && background.pending() == 0 {
 //!         let mut image = background.buffer();
 //!         image.fill([0.5; 3]); // the mean of these `spp` samples, read back
 //!         background.push_image(std::mem::take(&mut spp), image)?;
 //!         background.judge()?;
 //!     }
-//!     let news = background.news()?;
+//!     let news = if spp < background.spp_left() {
+//!         spp += 4; // your renderer: four more samples of each pixel, summed up on the GPU
+//!         background.news()?
+//!     } else {
+//!         background.finish()? // no tile takes more: only a verdict is to come
+//!     };
 //!     news.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
 //! }
 //! background.finish()?;
@@ -73,6 +77,7 @@ pub struct News {
 pub struct Background<C = Box<dyn StoppingCriterion + Send>> {
     shared: Arc<Shared<C>>,
     grid: TileGrid,
+    max_spp: u64,
     waiting: usize,
     when_full: WhenFull,
     thread: Mutex<Option<JoinHandle<()>>>,
@@ -100,8 +105,8 @@ struct State {
     /// What has been pushed since the last pass was handed over.
     pass: Pass,
     waiting: VecDeque<Pass>,
-    /// Whether a pass is being judged.
-    busy: bool,
+    /// Of the pass that is being judged, what its batches are of and their samples.
+    at_work: Option<Vec<(Of, u64)>>,
     ending: bool,
     /// What the session wanted after the last pass.
     requests: Vec<Request>,
@@ -156,7 +161,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         when_full: WhenFull,
         run: impl Fn(&mut (dyn FnMut() + Send)) + Send + 'static,
     ) -> Result<Self, SessionError> {
-        let grid = session.film().grid();
+        let (grid, max_spp) = (session.film().grid(), session.params().max_spp);
         let (requests, next_pass) = (session.requests(), session.next_pass());
         let shared = Arc::new(Shared {
             judged: Mutex::new(Judged { session: Some(session), late: None, running: None }),
@@ -166,7 +171,8 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         let of_thread = Arc::clone(&shared);
         let thread = thread::Builder::new().name("noisefloor".into()).spawn(move || of_thread.work(run));
         let thread = thread.map_err(|error| SessionError::Background(error.to_string()))?;
-        Ok(Self { shared, grid, waiting: waiting.max(1), when_full, thread: Mutex::new(Some(thread)) })
+        let thread = Mutex::new(Some(thread));
+        Ok(Self { shared, grid, max_spp, waiting: waiting.max(1), when_full, thread })
     }
 
     /// An image for [`Background::push_image`], of an earlier pass if one is done: what is in it is of no use.
@@ -258,13 +264,36 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// Passes that were handed over and are not judged yet. It does not wait. A renderer that goes on summing up until
     /// this is 0 hands over as few passes as verdicts need, and renders past the stop only what one verdict takes.
     pub fn pending(&self) -> usize {
-        let state = self.shared.state();
-        state.waiting.len() + usize::from(state.busy)
+        self.shared.state().pending()
     }
 
     /// As [`Session::next_pass`], after the last pass that was judged. It does not wait.
     pub fn next_pass(&self) -> Option<u64> {
         self.shared.state().next_pass
+    }
+
+    /// Samples per pixel that open tiles can still get before they stop at [`Params::max_spp`](crate::Params::max_spp), beside
+    /// all that was handed over. It does not wait. A renderer that has summed up as many waits for the verdict
+    /// ([`Background::finish`]): what it would render meanwhile is beyond the stop. 0 when all tiles are done, or will be with
+    /// the passes that are pending, as far as is known: a verdict can open a tile again.
+    pub fn spp_left(&self) -> u64 {
+        let state = self.shared.state();
+        let mut samples = vec![self.max_spp; self.grid.len()];
+        for request in &state.requests {
+            samples[request.tile.index] = request.first;
+        }
+        let waiting = state.waiting.iter().flatten().map(|push| (push.of, push.spp));
+        for (of, spp) in state.at_work.iter().flatten().copied().chain(waiting) {
+            match of {
+                Of::Tile(tile) => samples[tile] = samples[tile].saturating_add(spp),
+                Of::Image => samples.iter_mut().for_each(|samples| *samples = samples.saturating_add(spp)),
+                Of::Running => samples.iter_mut().for_each(|samples| *samples = spp.max(*samples)),
+            }
+        }
+        let least = samples.into_iter().min().unwrap_or(self.max_spp);
+        let left = self.max_spp.saturating_sub(least);
+        // A tile that has as many and is open is so for a reason: one of its halves may be empty
+        if state.pending() == 0 { left.max(state.next_pass.unwrap_or(0)) } else { left }
     }
 
     /// As [`Session::requests`], after the last pass that was judged; it does not wait. What was handed over since is
@@ -283,7 +312,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// # Errors
     /// As of [`Background::news`].
     pub fn finish(&self) -> Result<News, SessionError> {
-        let at_work = |state: &mut State| state.failed.is_none() && (state.busy || !state.waiting.is_empty());
+        let at_work = |state: &mut State| state.failed.is_none() && state.pending() > 0;
         drop(self.shared.wait_while(self.shared.state(), at_work));
         self.news()
     }
@@ -384,7 +413,7 @@ impl<C: StoppingCriterion + Send> Shared<C> {
         loop {
             let mut state = self.wait_while(self.state(), |state| state.waiting.is_empty() && !state.ending);
             let Some(mut pass) = state.waiting.pop_front() else { return };
-            state.busy = true;
+            state.at_work = Some(pass.iter().map(|push| (push.of, push.spp)).collect());
             drop(state);
             self.changed.notify_all();
 
@@ -399,7 +428,7 @@ impl<C: StoppingCriterion + Send> Shared<C> {
             };
 
             let mut state = self.state();
-            state.busy = false;
+            state.at_work = None;
             let images =
                 pass.into_iter().filter(|push| !matches!(push.of, Of::Tile(_)) && !push.mean.is_empty());
             state.keep(images.map(|push| push.mean));
@@ -482,6 +511,10 @@ fn add_late<'a>(
 }
 
 impl State {
+    fn pending(&self) -> usize {
+        self.waiting.len() + usize::from(self.at_work.is_some())
+    }
+
     /// Keeps images to be filled again.
     fn keep(&mut self, images: impl IntoIterator<Item = Vec<Rgb>>) {
         self.spent.extend(images);

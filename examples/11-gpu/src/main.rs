@@ -147,14 +147,18 @@ fn picture(size: (u32, u32)) -> Result<Option<Vec<Rgb>>, Box<dyn Error>> {
     let background = Background::new(session, 1, WhenFull::Wait)?;
     let start = Instant::now();
     while let Some(wanted) = background.next_pass() {
-        renderer.add(AT_ONCE)?;
         if renderer.spp >= wanted && background.pending() == 0 {
             let mut image = background.buffer();
             let spp = renderer.take(&mut image)?;
             background.push_image(spp, image)?;
             background.judge()?;
         }
-        let news = background.news()?;
+        let news = if renderer.spp < background.spp_left() {
+            renderer.add(AT_ONCE)?;
+            background.news()?
+        } else {
+            background.finish()?
+        };
         news.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
         if !news.stops.is_empty() {
             let (seconds, open) = (start.elapsed().as_secs_f64(), background.requests().len());

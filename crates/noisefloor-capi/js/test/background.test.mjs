@@ -29,7 +29,7 @@ const own = ([r, g, b]) => [Math.min(1, r), Math.min(1, g * g), b / (1 + b)];
 
 for (const curve of ["aces", own]) {
   test(`stops are those of a session that waits, with ${curve.name ?? curve}`, async () => {
-    const options = { tile: 32, maxSpp: 400, toneMapping: { curve } };
+    const options = { tile: 32, maxSpp: 400, toneMapping: { curve }, linear: true };
     const here = new Session(width, height, options);
     const there = await BackgroundSession.open(width, height, { ...options, waiting: 2 });
     assert.equal(there.nextSpp, here.nextSpp);
@@ -71,6 +71,34 @@ test("passes that find no room become one, and nothing waits", async () => {
     image.forEach((value, i) => assert.ok(Math.abs(value - sum[i] / 12) < 1e-5));
     session.close();
   }
+});
+
+test("whoever asks renders nothing beyond the limit", async () => {
+  for (const [running, whenFull] of [[false, "wait"], [true, "wait"], [false, "merge"]]) {
+    const session = await BackgroundSession.open(width, height, { tile: 32, maxSpp: 100, linear: true, whenFull });
+    let handed = 0;
+    const sum = new Float64Array(3 * width * height);
+    const images = passes(1);
+    assert.equal(session.sppLeft, 100);
+    for (const spp of [10, 40, 20, 7, 23]) {
+      const image = images.next().value;
+      image.forEach((value, i) => (sum[i] += spp * value));
+      handed += spp;
+      if (running) await session.pushRunning(sum.map((value) => value / handed), { spp: handed });
+      else await session.push(image, { spp });
+      assert.equal(session.sppLeft, 100 - handed, "judged or not");
+    }
+    await session.finish();
+    assert.ok(session.isDone && session.states.every(({ spp }) => spp === 100));
+    assert.equal(session.sppLeft, 0);
+    session.close();
+  }
+  // One half is empty: no verdict can come of it, and the page is not kept waiting
+  const session = await BackgroundSession.open(width, height, { tile: 32, maxSpp: 100 });
+  await session.push(passes(1).next().value, { spp: 100 });
+  await session.finish();
+  assert.deepEqual([session.sppLeft, session.isDone], [1, false]);
+  session.close();
 });
 
 test("what is wrong comes as an error of a later call", async () => {

@@ -83,6 +83,7 @@ fn stops_are_those_of_a_session_that_waits() {
         judged: passes,
         pending: 0,
         next_pass: 0,
+        spp_left: 0,
         open_tiles: 0,
         stops: tiles,
         warnings: 0,
@@ -149,4 +150,25 @@ fn faults_and_wrong_calls_are_said() {
     assert_eq!(nf_background_judge(background), NfStatus::Fault);
     assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
     assert_eq!(requests(&session)[0].first, 0);
+}
+
+/// Noise that nobody could overlook: no tile stops before the limit.
+#[test]
+fn what_is_left_is_said() {
+    let session = session(&NfParams { max_spp: 100, ..params() });
+    let background = begin(&session, 4, NF_FULL_WAIT);
+    let mut noise = noisefloor_testkit::Noise::new(63);
+    let mut left = 100;
+    assert_eq!(state(background).spp_left, left);
+    for spp in [20, 30, 12, 38] {
+        let image: Vec<f32> = (0..3 * PIXELS).map(|_| (0.5 + 0.4 * noise.normal().abs()) as f32).collect();
+        assert_eq!(push_image(background, spp, &image), NfStatus::Ok, "{}", message());
+        assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
+        left -= spp;
+        assert_eq!(state(background).spp_left, left, "judged or not");
+    }
+    assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
+    let NfBackgroundState { next_pass, spp_left, open_tiles, .. } = state(background);
+    assert_eq!((next_pass, spp_left, open_tiles), (0, 0, 0));
+    assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
 }

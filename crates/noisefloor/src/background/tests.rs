@@ -231,8 +231,11 @@ impl StoppingCriterion for Reopens {
     }
 }
 
-/// Converged after 100 samples; `judge` is called at each verdict.
-struct Calls<F>(F);
+/// Converged after so many samples; `call` is called at each verdict.
+struct Calls<F> {
+    enough: u64,
+    call: F,
+}
 
 impl<F: FnMut()> StoppingCriterion for Calls<F> {
     fn name(&self) -> String {
@@ -244,13 +247,14 @@ impl<F: FnMut()> StoppingCriterion for Calls<F> {
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        self.0();
-        Ok(tiles.iter().map(|tile| Verdict::new(view.film.spp(tile.index) >= 100)).collect())
+        (self.call)();
+        Ok(tiles.iter().map(|tile| Verdict::new(view.film.spp(tile.index) >= self.enough)).collect())
     }
 }
 
 fn of_calls<F: FnMut() + Send>(call: F) -> Session<Calls<F>> {
-    Session::new(32, 16, Calls(call), Params::default().with_tile(16).with_max_spp(1 << 20)).unwrap()
+    let judge = Calls { enough: 100, call };
+    Session::new(32, 16, judge, Params::default().with_tile(16).with_max_spp(1 << 20)).unwrap()
 }
 
 fn grey<C: StoppingCriterion + Send + 'static>(background: &Background<C>) -> Result<(), SessionError> {
@@ -415,4 +419,116 @@ fn work_goes_to_the_pool_of_the_embedder() {
     let background = Background::new_in(session, 1, WhenFull::Wait, |_| ()).unwrap();
     drop(grey(&background));
     assert!(matches!(background.finish(), Err(SessionError::Background(_))));
+}
+
+/// A clock that a renderer turns, so that a verdict takes as many calls of the renderer as it is said to, or until that waits.
+#[derive(Default)]
+struct Clock {
+    calls: Mutex<(u64, bool)>,
+    changed: Condvar,
+}
+
+impl Clock {
+    fn set(&self, change: impl FnOnce(&mut (u64, bool))) {
+        change(&mut self.calls.lock().unwrap());
+        self.changed.notify_all();
+    }
+
+    fn wait(&self, calls: u64) {
+        let now = self.calls.lock().unwrap();
+        let until = now.0 + calls;
+        drop(self.changed.wait_while(now, |(calls, waits)| *calls < until && !*waits).unwrap());
+    }
+}
+
+/// Never converged: all tiles stop at 400 samples. A verdict takes 30 calls of the renderer, each of 4 samples.
+fn never(clock: &Arc<Clock>) -> Session<Calls<impl FnMut() + Send + use<>>> {
+    let clock = Arc::clone(clock);
+    let params =
+        Params::default().with_tile(16).with_schedule(Schedule::Growing { step: 16 }).with_max_spp(400);
+    let judge = Calls { enough: u64::MAX, call: move || clock.wait(30) };
+    Session::new(32, 16, judge, params).unwrap()
+}
+
+/// A renderer of whole frames that is as fast as verdicts are slow: the passes that it hands over, and what it renders in vain.
+fn rendered(asks: bool) -> (Vec<u64>, u64) {
+    let clock = Arc::new(Clock::default());
+    let background = Background::new(never(&clock), 1, WhenFull::Wait).unwrap();
+    let (mut spp, mut passes) = (0, Vec::new());
+    while let Some(wanted) = background.next_pass() {
+        if spp >= wanted && background.pending() == 0 {
+            passes.push(spp);
+            background.push_image(std::mem::take(&mut spp), vec![[0.5; 3]; 32 * 16]).unwrap();
+            background.judge().unwrap();
+        }
+        if !asks || spp < background.spp_left() {
+            spp += 4;
+            clock.set(|(calls, _)| *calls += 1);
+        } else {
+            clock.set(|(_, waits)| *waits = true);
+            background.finish().unwrap();
+            clock.set(|(_, waits)| *waits = false);
+        }
+    }
+    let stops = background.finish().unwrap().stops;
+    let plain = Arc::new(Clock::default());
+    plain.set(|(_, waits)| *waits = true);
+    let mut plain = never(&plain);
+    let as_waiting = passes.iter().flat_map(|&spp| {
+        plain.push_image(spp, &[[0.5; 3]; 512]).unwrap();
+        plain.judge().unwrap()
+    });
+    let as_waiting: Vec<Stop> = as_waiting.collect();
+    assert!(as_waiting.len() == 2 && (stops.is_empty() || stops == as_waiting));
+    (passes, spp)
+}
+
+/// Whoever asks renders just what the limit allows; whoever does not renders on for as long as the last verdict takes.
+#[test]
+fn a_renderer_that_asks_renders_nothing_beyond_the_limit() {
+    let (passes, in_vain) = rendered(true);
+    assert_eq!((passes.iter().sum::<u64>(), in_vain), (400, 0), "{passes:?}");
+    let (passes, in_vain) = rendered(false);
+    assert!(passes.iter().sum::<u64>() + in_vain >= 400 + 4 * 29, "{passes:?} {in_vain}");
+}
+
+#[test]
+fn what_is_left_counts_all_that_was_handed_over() {
+    let (open, session) = gate();
+    let background = Background::new(session, 3, WhenFull::Wait).unwrap();
+    let limit = 1 << 20;
+    let image = || vec![[0.5; 3]; 32 * 16];
+    assert_eq!(background.spp_left(), limit);
+    background.push_image(100, image()).unwrap();
+    // Not handed over yet
+    assert_eq!(background.spp_left(), limit);
+    background.push(1, 50, vec![[0.5; 3]; 16 * 16]).unwrap();
+    background.judge().unwrap();
+    assert_eq!(background.spp_left(), limit - 100, "of the tile that has fewer");
+    background.push(0, 70, vec![[0.5; 3]; 16 * 16]).unwrap();
+    background.judge().unwrap();
+    assert_eq!(background.spp_left(), limit - 150);
+    background.push_running_image(160, image()).unwrap();
+    background.judge().unwrap();
+    assert_eq!(background.spp_left(), limit - 160);
+    background.push_image(limit, image()).unwrap();
+    background.judge().unwrap();
+    assert_eq!(background.spp_left(), 0);
+    open.store(true, Ordering::Release);
+    drop(background.finish());
+}
+
+/// A pass that has all samples leaves one half empty, so that no verdict can come of it: a renderer is not kept waiting.
+#[test]
+fn one_pass_with_all_samples_is_not_the_end() {
+    let session = fresh(TileGrid::new(32, 16, 16).unwrap());
+    let background = Background::new(session, 1, WhenFull::Wait).unwrap();
+    background.push_image(400, vec![[0.5; 3]; 32 * 16]).unwrap();
+    background.judge().unwrap();
+    background.finish().unwrap();
+    assert_eq!((background.next_pass(), background.spp_left()), (Some(1), 1));
+    background.push_image(1, vec![[0.5; 3]; 32 * 16]).unwrap();
+    background.judge().unwrap();
+    assert_eq!(background.finish().unwrap().stops.len(), 2);
+    assert_eq!((background.next_pass(), background.spp_left()), (None, 0));
 }
