@@ -22,100 +22,129 @@ impl Plane {
     /// Splits off what is finer than `2^(level + 1)` pixels; what is left is the coarser rest. The picture is
     /// mirrored at its edges.
     pub(crate) fn split(&mut self, level: u32) -> Plane {
-        let step = 1usize << level;
-        let across = self.smooth(step, true);
-        let rest = across.smooth(step, false);
-        let fine = self.values.par_iter().zip(&rest.values).map(|(whole, rest)| whole - rest).collect();
-        let size = self.size;
-        *self = rest;
-        Plane { size, values: fine }
+        let (size, step) = (self.size, 1usize << level);
+        let (width, height) = size;
+        let mut across = vec![0.0; self.values.len()];
+        let rows = across.par_chunks_exact_mut(width).zip(self.values.par_chunks_exact(width));
+        rows.for_each(|(out, row)| smooth_row(row, step, out));
+        let mut rest = vec![0.0; self.values.len()];
+        // What is finer takes the place of the whole
+        let rows = rest.par_chunks_exact_mut(width).zip(self.values.par_chunks_exact_mut(width));
+        rows.enumerate().for_each(|(y, (rest, fine))| {
+            let at = |offset: isize| {
+                let from = mirrored(y as isize + offset * step as isize, height) * width;
+                &across[from..][..width]
+            };
+            smooth([0, 1, -1, 2, -2].map(at), rest);
+            fine.iter_mut().zip(rest).for_each(|(fine, rest)| *fine -= *rest);
+        });
+        Plane { size, values: std::mem::replace(&mut self.values, rest) }
     }
+}
 
-    /// The spline with holes of `step`, along rows or columns.
-    fn smooth(&self, step: usize, along_rows: bool) -> Plane {
-        let (width, height) = self.size;
-        let mut out = vec![0.0; self.values.len()];
-        out.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-            for (distance, weight) in SPLINE.iter().enumerate() {
-                let signs: &[isize] = if distance == 0 { &[1] } else { &[1, -1] };
-                for sign in signs {
-                    let offset = sign * (distance * step) as isize;
-                    if along_rows {
-                        let from = &self.values[y * width..(y + 1) * width];
-                        for (x, out) in row.iter_mut().enumerate() {
-                            *out += weight * from[mirrored(x as isize + offset, width)];
-                        }
-                    } else {
-                        let from = mirrored(y as isize + offset, height) * width;
-                        let from = &self.values[from..from + width];
-                        row.iter_mut().zip(from).for_each(|(out, value)| *out += weight * value);
-                    }
-                }
-            }
-        });
-        Plane { size: self.size, values: out }
+/// The spline with holes of `step`, along a row.
+fn smooth_row(row: &[f32], step: usize, out: &mut [f32]) {
+    let (width, reach) = (row.len(), 2 * step);
+    let mut edge = |x: usize| {
+        let at = |offset: isize| &row[mirrored(x as isize + offset * step as isize, width)..][..1];
+        smooth([0, 1, -1, 2, -2].map(at), &mut out[x..=x]);
+    };
+    (0..reach.min(width)).chain(width.saturating_sub(reach).max(reach)..width).for_each(&mut edge);
+    if width > 2 * reach {
+        let at = |from: usize| &row[from..][..width - 2 * reach];
+        smooth([reach, reach + step, reach - step, 2 * reach, 0].map(at), &mut out[reach..width - reach]);
     }
+}
 
-    /// The mean over a square of `2·radius + 1` pixels around each pixel, of what of it lies in the picture.
-    pub(crate) fn local_mean(&self, radius: usize) -> Plane {
-        let width = self.size.0;
-        // Sums over rows, then over columns of these
-        let mut across = vec![0.0f64; self.values.len()];
-        let rows = self.values.par_chunks_exact(width).zip(across.par_chunks_exact_mut(width));
-        rows.for_each(|(row, out)| {
-            let mut sum: f64 = row[..radius.min(width)].iter().map(|&v| f64::from(v)).sum();
-            for (x, out) in out.iter_mut().enumerate() {
-                if let Some(&entering) = row.get(x + radius) {
-                    sum += f64::from(entering);
-                }
-                if x > radius {
-                    sum -= f64::from(row[x - radius - 1]);
-                }
-                *out = sum / window(x, radius, width);
-            }
-        });
-        // Columns are added up by themselves, a strip of them for each thread
-        let strips: Vec<Vec<f32>> = (0..width)
-            .step_by(STRIP)
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|from| means_down(&across, self.size, radius, from..(from + STRIP).min(width)))
-            .collect();
-        let mut values = vec![0.0; self.values.len()];
-        values.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-            for (row, strip) in row.chunks_mut(STRIP).zip(&strips) {
-                row.copy_from_slice(&strip[y * row.len()..][..row.len()]);
-            }
-        });
-        Plane { size: self.size, values }
+/// The spline of the pixels in its middle, of those to both sides of it, and of those beyond these.
+fn smooth([here, after, before, beyond, behind]: [&[f32]; 5], out: &mut [f32]) {
+    let n = out.len();
+    let (here, after, before) = (&here[..n], &after[..n], &before[..n]);
+    let (beyond, behind) = (&beyond[..n], &behind[..n]);
+    let [middle, side, end] = SPLINE;
+    for i in 0..n {
+        out[i] = middle * here[i] + side * after[i] + side * before[i] + end * beyond[i] + end * behind[i];
     }
 }
 
 /// Columns that one thread adds up.
 const STRIP: usize = 128;
 
+/// Means of several values, in strips of columns.
+pub(crate) struct LocalMeans<const N: usize> {
+    width: usize,
+    strips: Vec<Vec<[f32; N]>>,
+}
+
+impl<const N: usize> LocalMeans<N> {
+    /// Of what `of` says of each pixel: the mean over a square of `2·radius + 1` pixels around it, of what of that lies in the
+    /// picture.
+    pub(crate) fn new(
+        (width, height): (usize, usize),
+        radius: usize,
+        of: impl Fn(usize) -> [f32; N] + Sync,
+    ) -> Self {
+        // Sums over rows, then over columns of these
+        let mut across = vec![[0.0f64; N]; width * height];
+        across.par_chunks_exact_mut(width).enumerate().for_each(|(y, out)| {
+            let row: Vec<[f32; N]> = (y * width..(y + 1) * width).map(&of).collect();
+            let mut sums = [0.0f64; N];
+            let ahead = row[..radius.min(width)].iter();
+            ahead.for_each(|values| add(&mut sums, values.map(f64::from)));
+            for (x, out) in out.iter_mut().enumerate() {
+                if let Some(entering) = row.get(x + radius) {
+                    add(&mut sums, entering.map(f64::from));
+                }
+                if x > radius {
+                    add(&mut sums, row[x - radius - 1].map(|value| -f64::from(value)));
+                }
+                let columns = window(x, radius, width);
+                *out = sums.map(|sum| sum / columns);
+            }
+        });
+        // Columns are added up by themselves, a strip of them for each thread
+        let starts: Vec<usize> = (0..width).step_by(STRIP).collect();
+        let down =
+            |&from: &usize| means_down(&across, (width, height), radius, from..(from + STRIP).min(width));
+        Self { width, strips: starts.par_iter().map(down).collect() }
+    }
+
+    /// Those of a row of the picture.
+    pub(crate) fn row(&self, y: usize) -> impl Iterator<Item = &[f32; N]> {
+        self.strips.iter().enumerate().flat_map(move |(n, strip)| {
+            let columns = STRIP.min(self.width - n * STRIP);
+            &strip[y * columns..][..columns]
+        })
+    }
+}
+
+fn add<const N: usize>(sums: &mut [f64; N], values: [f64; N]) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+}
+
 /// Means along some columns, over `2·radius + 1` rows around each.
-fn means_down(
-    across: &[f64],
+fn means_down<const N: usize>(
+    across: &[[f64; N]],
     (width, height): (usize, usize),
     radius: usize,
     columns: Range<usize>,
-) -> Vec<f32> {
+) -> Vec<[f32; N]> {
     let row = |y: usize| &across[y * width..][columns.clone()];
-    let mut sums = vec![0.0f64; columns.len()];
+    let mut sums = vec![[0.0f64; N]; columns.len()];
     for y in 0..radius.min(height) {
-        sums.iter_mut().zip(row(y)).for_each(|(sum, v)| *sum += v);
+        sums.iter_mut().zip(row(y)).for_each(|(sums, &values)| add(sums, values));
     }
     let mut means = Vec::with_capacity(columns.len() * height);
     for y in 0..height {
         if y + radius < height {
-            sums.iter_mut().zip(row(y + radius)).for_each(|(sum, v)| *sum += v);
+            sums.iter_mut().zip(row(y + radius)).for_each(|(sums, &values)| add(sums, values));
         }
         if y > radius {
-            sums.iter_mut().zip(row(y - radius - 1)).for_each(|(sum, v)| *sum -= v);
+            let leaving = sums.iter_mut().zip(row(y - radius - 1));
+            leaving.for_each(|(sums, values)| add(sums, values.map(|value| -value)));
         }
         let rows = window(y, radius, height);
-        means.extend(sums.iter().map(|sum| (sum / rows) as f32));
+        means.extend(sums.iter().map(|sums| sums.map(|sum| (sum / rows) as f32)));
     }
     means
 }
@@ -155,6 +184,34 @@ mod tests {
         }
     }
 
+    /// By the definition, pixel by pixel: what is finer is what the spline in both directions leaves.
+    #[test]
+    fn what_is_finer_is_what_the_mirrored_spline_leaves() {
+        for (size, level) in
+            [((40, 23), 0), ((40, 23), 2), ((17, 9), 3), ((1, 7), 1), ((3, 2), 4), ((9, 1), 1)]
+        {
+            let plane = noise(size);
+            let spline = |of: &dyn Fn(isize) -> f64| {
+                let weights = [(0, 6.0), (1, 4.0), (-1, 4.0), (2, 1.0), (-2, 1.0)];
+                weights.iter().map(|&(at, weight)| weight / 16.0 * of(at * (1 << level))).sum::<f64>()
+            };
+            let smoothed = |x: usize, y: usize| {
+                spline(&|dy| {
+                    let row = mirrored(y as isize + dy, size.1) * size.0;
+                    spline(&|dx| f64::from(plane.values[row + mirrored(x as isize + dx, size.0)]))
+                })
+            };
+            let fine = plane.clone().split(level);
+            for (i, found) in fine.values.iter().enumerate() {
+                let expected = f64::from(plane.values[i]) - smoothed(i % size.0, i / size.0);
+                assert!(
+                    (f64::from(*found) - expected).abs() < 1e-6,
+                    "{size:?}, {level}, {i}: {found} {expected}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn a_constant_has_no_details() {
         let mut plane = Plane::new((20, 30), vec![0.7; 600]);
@@ -179,8 +236,10 @@ mod tests {
     fn local_means_are_means_of_what_is_there() {
         for (size, radius) in [((17, 9), 2), ((5, 6), 32), ((40, 1), 3)] {
             let plane = noise(size);
-            let mean = plane.local_mean(radius);
-            for (i, found) in mean.values.iter().enumerate() {
+            let means = LocalMeans::new(size, radius, |i| [plane.values[i], -plane.values[i]]);
+            let rows = (0..size.1).flat_map(|y| means.row(y));
+            for (i, [found, other]) in rows.enumerate() {
+                assert_eq!(*other, -found);
                 let (x, y) = (i % size.0, i / size.0);
                 let near =
                     |j: &usize| (j % size.0).abs_diff(x) <= radius && (j / size.0).abs_diff(y) <= radius;

@@ -36,11 +36,17 @@ impl Light {
 /// noise explains the difference, or if there is next to none.
 pub(crate) fn shift(light: &[Light], display: &Display) -> f32 {
     let count = light.len().max(1) as f64;
+    let (mut noisy, mut energy, mut denoised) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    for light in light {
+        for c in 0..3 {
+            noisy[c] += f64::from(light.noisy[c]);
+            energy[c] += f64::from(light.noise[c]).powi(2);
+            denoised[c] += f64::from(light.denoised[c]);
+        }
+    }
     let mut shift = 0.0f32;
     for c in 0..3 {
-        let sum = |of: &dyn Fn(&Light) -> f32| light.iter().map(|l| f64::from(of(l))).sum::<f64>();
-        let energy: f64 = light.iter().map(|l| f64::from(l.noise[c]).powi(2)).sum();
-        let (noisy, denoised) = (sum(&|l| l.noisy[c]) / count, sum(&|l| l.denoised[c]) / count);
+        let (noisy, denoised, energy) = (noisy[c] / count, denoised[c] / count, energy[c]);
         let explained = ERRORS * energy.sqrt() / count;
         // What lies beyond the display is shown as its end is
         let shown = |value: f64| display.encode([value.clamp(0.0, f64::from(f32::MAX)) as f32; 3])[c];

@@ -23,7 +23,7 @@
 //!
 //! The vision model does not see the mean of a tile; `brightness.rs` compares it.
 
-use crate::bands::Plane;
+use crate::bands::{LocalMeans, Plane};
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::{DenoiseError, cut};
 use crate::parts::within;
@@ -338,21 +338,21 @@ fn add_common([sum, other]: [&mut [f32]; 2], mut residuals: [Plane; 2]) {
         let part =
             |residual: &mut Plane| if scale < SCALES { residual.split(scale) } else { residual.clone() };
         let (a, b) = rayon::join(|| part(ra), || part(rb));
-        let pairs = || a.values.par_iter().zip(&b.values);
-        let mean_of = |of: fn(f32, f32) -> f32| {
-            Plane::new(a.size, pairs().map(|(&a, &b)| of(a, b)).collect()).local_mean(RADIUS)
-        };
-        let (product, energy) =
-            rayon::join(|| mean_of(|a, b| a * b), || mean_of(|a, b| 0.25 * (a + b) * (a + b)));
-        let local = product.values.par_iter().zip(&energy.values);
-        let sums = sum.par_iter_mut().zip(other.par_iter_mut());
-        sums.zip(pairs()).zip(local).for_each(|(((sum, other), (a, b)), (&common, &energy))| {
-            // Chance makes the mean product negative, too: nothing in common then. The estimate is that much too
-            // large on average where there is no bias; what it misses elsewhere makes up for it
-            let share = if energy > 0.0 { (common / energy).clamp(0.0, 1.0).sqrt() } else { 0.0 };
-            let common = share * 0.5 * (a + b);
-            *sum += common;
-            *other += common;
+        let (size, a, b) = (a.size, &a.values, &b.values);
+        let product_and_energy = |i: usize| [a[i] * b[i], 0.25 * (a[i] + b[i]) * (a[i] + b[i])];
+        let means = LocalMeans::new(size, RADIUS, product_and_energy);
+        let rows = sum.par_chunks_exact_mut(size.0).zip(other.par_chunks_exact_mut(size.0)).enumerate();
+        rows.for_each(|(y, (sum, other))| {
+            let pairs = a[y * size.0..].iter().zip(&b[y * size.0..]);
+            let sums = sum.iter_mut().zip(other);
+            for (((sum, other), (a, b)), &[common, energy]) in sums.zip(pairs).zip(means.row(y)) {
+                // Chance makes the mean product negative, too: nothing in common then. The estimate is that much too
+                // large on average where there is no bias; what it misses elsewhere makes up for it
+                let share = if energy > 0.0 { (common / energy).clamp(0.0, 1.0).sqrt() } else { 0.0 };
+                let common = share * 0.5 * (a + b);
+                *sum += common;
+                *other += common;
+            }
         });
     }
 }

@@ -23,14 +23,26 @@ const AROUND: isize = 2;
 
 /// The bias of lines and dots, from the residuals of both halves, as far as `known` lacks it at each pixel, row-major.
 pub(crate) fn thin_bias((width, height): (usize, usize), residuals: [&[f32]; 2], known: &[f32]) -> Vec<f32> {
-    let down = Lines { residuals, known, length: height, step: width, across: 1, breadth: width };
-    let along = Lines { residuals, known, length: width, step: 1, across: width, breadth: height };
+    let turned = residuals.map(|plane| transposed((width, height), plane));
+    let down = Lines {
+        residuals: turned.each_ref().map(Vec::as_slice),
+        known: Strided { plane: known, step: width, across: 1 },
+        length: height,
+        breadth: width,
+    };
+    let along = Lines {
+        residuals,
+        known: Strided { plane: known, step: 1, across: width },
+        length: width,
+        breadth: height,
+    };
     let mut bias = vec![0.0f32; width * height];
     for lines in [down, along] {
-        let found: Vec<Vec<f32>> = (0..lines.breadth).into_par_iter().map(|at| lines.missing(at)).collect();
+        let found: Vec<Vec<(usize, f32)>> =
+            (0..lines.breadth).into_par_iter().map(|at| lines.missing(at)).collect();
         for (at, line) in found.into_iter().enumerate() {
-            for (place, found) in line.into_iter().enumerate() {
-                let bias: &mut f32 = &mut bias[at * lines.across + place * lines.step];
+            for (place, found) in line {
+                let bias: &mut f32 = &mut bias[lines.known.index(at, place)];
                 // Where lines cross, one of them
                 if found.abs() > bias.abs() {
                     *bias = found;
@@ -54,16 +66,43 @@ fn lacking(bias: f32, known: f32) -> f32 {
     if missing * bias > 0.0 { missing } else { 0.0 }
 }
 
+/// Columns as rows.
+fn transposed((width, height): (usize, usize), plane: &[f32]) -> Vec<f32> {
+    // As many rows as a line of the cache has numbers
+    const AT_ONCE: usize = 16;
+    let mut turned = vec![0.0; plane.len()];
+    turned.par_chunks_mut(AT_ONCE * height).enumerate().for_each(|(n, columns)| {
+        let from = n * AT_ONCE;
+        for y in 0..height {
+            let row = &plane[y * width + from..][..columns.len() / height];
+            row.iter().enumerate().for_each(|(x, value)| columns[x * height + y] = *value);
+        }
+    });
+    turned
+}
+
+/// A plane, with the steps from one pixel of a line to the next, and to that beside it.
+#[derive(Clone, Copy)]
+struct Strided<'a> {
+    plane: &'a [f32],
+    step: usize,
+    across: usize,
+}
+
+impl Strided<'_> {
+    fn index(&self, at: usize, place: usize) -> usize {
+        at * self.across + place * self.step
+    }
+}
+
 /// All rows of a picture, or all columns.
 #[derive(Clone, Copy)]
 struct Lines<'a> {
+    /// Line after line.
     residuals: [&'a [f32]; 2],
-    known: &'a [f32],
-    /// Pixels of each, and from one to the next.
+    known: Strided<'a>,
+    /// Pixels of each, and how many there are.
     length: usize,
-    step: usize,
-    /// From each to the one beside it, and how many there are.
-    across: usize,
     breadth: usize,
 }
 
@@ -87,36 +126,51 @@ impl Running {
 }
 
 impl Lines<'_> {
-    /// What is missing along one of them, whose residuals are not those of its neighbours to both sides.
-    fn missing(&self, at: usize) -> Vec<f32> {
-        let line = |plane: &[f32], at: usize, place: usize| plane[at * self.across + place * self.step];
-        let places = || 0..self.length;
+    fn line<'b>(&self, plane: &'b [f32], at: usize) -> &'b [f32] {
+        &plane[at * self.length..][..self.length]
+    }
+
+    /// What is missing along one of them, whose residuals are not those of its neighbours to both sides: place by place.
+    fn missing(&self, at: usize) -> Vec<(usize, f32)> {
         let beside = [-1, 1].map(|side| mirrored(at as isize + side * BESIDE as isize, self.breadth));
-        let differences = [0, 1, 2, 3].map(|which| {
+        let around = |place: usize| (place.saturating_sub(RADIUS), (place + RADIUS + 1).min(self.length));
+        // Hardly a line is clear to one side, and few of these in all four ways
+        let mut clear: Vec<usize> = (0..self.length).collect();
+        let mut differences = Vec::with_capacity(4);
+        for which in 0..4 {
             let (plane, beside) = (self.residuals[which % 2], beside[which / 2]);
-            Running::of(places().map(|place| line(plane, at, place) - line(plane, beside, place)))
-        });
-        let [a, b] = self.residuals.map(|plane| Running::of(places().map(|place| line(plane, at, place))));
-        let known = Running::of(places().map(|place| line(self.known, at, place)));
-        let around = |place: usize| {
-            let (from, to) = (place.saturating_sub(RADIUS), (place + RADIUS + 1).min(self.length));
+            let pairs = self.line(plane, at).iter().zip(self.line(plane, beside));
+            let sums = Running::of(pairs.map(|(own, other)| own - other));
+            clear.retain(|&place| {
+                let (from, to) = around(place);
+                let [sum, squares] = sums.between(from, to);
+                sum.abs() > CLEAR * squares.sqrt()
+            });
+            if clear.is_empty() {
+                return Vec::new();
+            }
+            differences.push(sums);
+        }
+        let [a, b] = self.residuals.map(|plane| Running::of(self.line(plane, at).iter().copied()));
+        let known = (0..self.length).map(|place| self.known.plane[self.known.index(at, place)]);
+        let known = Running::of(known);
+        let missing = |place: usize| {
+            let (from, to) = around(place);
             let (mut beyond, mut signs) = (0.0, 0.0);
             for sums in &differences {
-                let [sum, squares] = sums.between(from, to);
-                if sum.abs() <= CLEAR * squares.sqrt() {
-                    return 0.0;
-                }
+                let [sum, _] = sums.between(from, to);
                 (beyond, signs) = (beyond + sum / 4.0, signs + sum.signum());
             }
             let own = (a.between(from, to)[0] + b.between(from, to)[0]) / 2.0;
             if f64::abs(signs) < 4.0 || own * beyond <= 0.0 {
-                return 0.0;
+                return None;
             }
             // Rare light that a line has not met is missing in all of it, and no bias
             let bias = own.abs().min(beyond.abs()).copysign(own) / (to - from) as f64;
-            lacking(bias as f32, (known.between(from, to)[0] / (to - from) as f64) as f32)
+            let known = (known.between(from, to)[0] / (to - from) as f64) as f32;
+            Some((place, lacking(bias as f32, known)))
         };
-        places().map(around).collect()
+        clear.into_iter().filter_map(missing).collect()
     }
 }
 
@@ -124,7 +178,9 @@ impl Lines<'_> {
 fn dot((width, height): (usize, usize), [a, b]: [&[f32]; 2], (x, y): (usize, usize)) -> f32 {
     let here = y * width + x;
     let (a_here, b_here) = (a[here], b[here]);
-    if a_here * b_here <= 0.0 {
+    let least = a_here.abs().min(b_here.abs());
+    // Most are not even clear of what they differ by, which is quickly said
+    if a_here * b_here <= 0.0 || least <= CLEAR_DOT * ((a_here - b_here).abs() / 2.0) {
         return 0.0;
     }
     let (mut energy, mut count) = (0.0, 0.0f32);
@@ -136,9 +192,7 @@ fn dot((width, height): (usize, usize), [a, b]: [&[f32]; 2], (x, y): (usize, usi
             count += 1.0;
         }
     }
-    let clear = a_here.abs().min(b_here.abs())
-        > CLEAR_DOT * (energy / count).sqrt().max((a_here - b_here).abs() / 2.0);
-    if clear { (a_here + b_here) / 2.0 } else { 0.0 }
+    if least > CLEAR_DOT * (energy / count).sqrt() { (a_here + b_here) / 2.0 } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -197,6 +251,32 @@ mod tests {
         let found = thin_bias(SIZE, dots.each_ref().map(Vec::as_slice), &vec![0.0; SIZE.0 * SIZE.1]);
         assert!((found[40 * SIZE.0 + 9] - 2.0).abs() < 0.3, "{}", found[40 * SIZE.0 + 9]);
         assert_eq!(found.iter().filter(|bias| **bias != 0.0).count(), 1);
+    }
+
+    /// Rows are looked at where they lie, and columns turned: a picture on its side has the same lines, on their side.
+    #[test]
+    fn a_picture_on_its_side_has_the_same_lines() {
+        let turn = |plane: &[f32]| -> Vec<f32> {
+            (0..plane.len()).map(|i| plane[i % SIZE.1 * SIZE.0 + i / SIZE.1]).collect()
+        };
+        let halves = [1, 2].map(|seed| {
+            let mut residual = noise(seed, |noise| noise.normal());
+            // One line each way, of one sign, and half of it known
+            residual.iter_mut().enumerate().for_each(|(i, value)| {
+                *value += if i % SIZE.0 == 37 { 1.0 } else { 0.0 };
+                *value -= if i / SIZE.0 == 60 { 1.5 } else { 0.0 };
+            });
+            residual
+        });
+        let known: Vec<f32> =
+            (0..halves[0].len()).map(|i| if i % SIZE.0 == 37 { 0.5 } else { 0.0 }).collect();
+        let found = thin_bias(SIZE, halves.each_ref().map(Vec::as_slice), &known);
+        assert!(found.iter().filter(|bias| **bias != 0.0).count() > 150);
+        let turned = halves.each_ref().map(|half| turn(half));
+        let other = thin_bias((SIZE.1, SIZE.0), turned.each_ref().map(Vec::as_slice), &turn(&known));
+        // Where both cross, and are as high, that one counts that comes first
+        let unlike = turn(&found).iter().zip(&other).filter(|(one, other)| one != other).count();
+        assert_eq!(unlike, 0);
     }
 
     #[test]

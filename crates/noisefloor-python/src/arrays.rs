@@ -2,10 +2,11 @@
 
 use crate::errors::{ParameterError, PictureError, SizeError};
 use noisefloor::{Rgb, display::srgb_decode};
-use numpy::ndarray::{Array2, Array3};
+use numpy::ndarray::{Array2, Array3, Axis};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3};
 use pyo3::prelude::*;
 use std::borrow::Cow;
+use std::thread;
 
 /// Linear radiance: an array of floats of shape (height, width, 3), or whatever numpy makes one of.
 pub(crate) struct Pixels<'py>(PyReadonlyArray3<'py, f32>);
@@ -30,16 +31,53 @@ impl<'py> FromPyObject<'_, 'py> for Pixels<'py> {
 impl Pixels<'_> {
     /// (width, height), and the pixels row-major; where they lie, if float32 and C-contiguous.
     pub(crate) fn get(&self) -> (usize, usize, Cow<'_, [Rgb]>) {
-        let view = self.0.as_array();
-        let (height, width, _) = view.dim();
+        let (width, height) = self.size();
         // That of ndarray: the one of numpy also takes arrays in Fortran order, as they lie
-        let pixels = match view.to_slice() {
+        let pixels = match self.0.as_array().to_slice() {
             Some(values) => Cow::Borrowed(values.as_chunks().0),
-            None => Cow::Owned(view.iter().copied().collect::<Vec<f32>>().as_chunks().0.to_vec()),
+            None => Cow::Owned(self.copied()),
         };
         (width, height, pixels)
     }
+
+    /// (width, height).
+    pub(crate) fn size(&self) -> (usize, usize) {
+        let (height, width, _) = self.0.as_array().dim();
+        (width, height)
+    }
+
+    /// A copy, row-major. The interpreter's lock is kept, so that nobody changes the pixels meanwhile; threads of rayon's pool
+    /// may wait for it, and are not used.
+    pub(crate) fn copied(&self) -> Vec<Rgb> {
+        let view = self.0.as_array();
+        let (height, width, _) = view.dim();
+        let mut pixels = vec![[0.0; 3]; width * height];
+        if pixels.is_empty() {
+            return pixels;
+        }
+        let threads =
+            thread::available_parallelism().map_or(1, usize::from).min(pixels.len().div_ceil(AT_ONCE));
+        let rows = height.div_ceil(threads);
+        let copy = |(n, part): (usize, &mut [Rgb])| {
+            for (y, row) in part.chunks_exact_mut(width).enumerate() {
+                let from = view.index_axis(Axis(0), n * rows + y);
+                for (pixel, from) in row.iter_mut().zip(from.outer_iter()) {
+                    *pixel = [from[0], from[1], from[2]];
+                }
+            }
+        };
+        let mut parts = pixels.chunks_mut(rows * width).enumerate();
+        let first = parts.next();
+        thread::scope(|scope| {
+            parts.for_each(|part| drop(scope.spawn(|| copy(part))));
+            first.map(copy);
+        });
+        pixels
+    }
 }
+
+/// Pixels that are worth a thread.
+const AT_ONCE: usize = 1 << 18;
 
 /// What the values of a picture are.
 #[derive(Clone, Copy)]

@@ -391,16 +391,12 @@ pub(crate) fn excess(
     }
     let oracle = oracle.map_or_else(Oracle::bundled, |oracle| oracle.0.clone());
     let params = params.map_or_else(|| Params::default().with_tile(TILE), |params| params.0);
-    let copy = |pixels: &Pixels<'_>| {
-        let (width, height, pixels) = pixels.get();
-        ((width, height), pixels.into_owned())
-    };
-    let (size, a) = copy(&a);
-    let (other, b) = copy(&b);
+    let (size, other) = (a.size(), b.size());
     if size != other {
         return Err(SizeError::new_err(format!("the pictures have different sizes, {size:?} and {other:?}")));
     }
-    let denoised = denoised.map(|(a, b)| [copy(&a).1, copy(&b).1]);
+    let (a, b) = (a.copied(), b.copied());
+    let denoised = denoised.map(|(a, b)| [a.copied(), b.copied()]);
     let (excess, warnings) =
         py.detach(|| pool::run(|| compare(&oracle, &params, size, [a, b], denoised, lost, spp)))?;
     for warning in warnings {
@@ -419,23 +415,29 @@ fn compare(
     lost: f64,
     spp: f64,
 ) -> PyResult<(PyExcess, Vec<StillWarning>)> {
-    let pair = PicturePair::new(size, pictures.clone(), spp).map_err(Raise::raise)?;
+    let pair = PicturePair::new(size, pictures, spp).map_err(Raise::raise)?;
     let unfit = |error| match error {
         PairError::Still(error) => error.raise(),
         PairError::Size(error) => error.raise(),
         other => CriterionError::new_err(other.to_string()),
     };
-    let warnings = pair.notice(params).map_err(unfit)?;
     let Some([da, db]) = denoised else {
+        let warnings = pair.notice(params).map_err(unfit)?;
         let (excess, map) = pair.noise(oracle, params).map_err(unfit)?;
         let squares = most_in_squares(size, &map);
         return Ok((PyExcess { excess, size, left: Left::Map(map), squares }, warnings));
     };
     let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());
     let compared = pair.compare(params);
-    let halves = DenoisedHalves { size, noisy: [&pictures[0], &pictures[1]], denoised: [&da, &db] };
-    let error = DenoisedError::new(&halves, compared.display()).map_err(|error| failed(&error))?;
-    let film = pair.film(params).map_err(Raise::raise)?;
+    let halves = DenoisedHalves { size, noisy: pair.halves(), denoised: [&da, &db] };
+    // Each has moments in which one thread works alone
+    let (warnings, (error, film)) = rayon::join(
+        || pair.notice(params),
+        || rayon::join(|| DenoisedError::new(&halves, compared.display()), || pair.film(params)),
+    );
+    let warnings = warnings.map_err(unfit)?;
+    let error = error.map_err(|error| failed(&error))?;
+    let film = film.map_err(Raise::raise)?;
     let found = error.excess(&film, lost, &params.viewing).map_err(|error| failed(&error))?;
     let DenoisedExcess { worst, squares, .. } = found;
     let excess = pair.tell_apart(worst);

@@ -30,6 +30,8 @@ const BLOCK: usize = 8;
 /// [`crate::watch`].
 const CERTAIN: f64 = 6.5;
 const NOTABLE: f64 = 0.1;
+/// Pixels that a thread looks at.
+const AT_ONCE: usize = 1 << 16;
 
 /// A picture with its samples per pixel.
 #[derive(Clone, Debug, PartialEq)]
@@ -224,7 +226,12 @@ impl Still {
         if !(self.spp.is_finite() && self.spp > 0.0) {
             return Err(StillError::Spp(self.spp));
         }
-        match self.pixels.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+        let parts = self.pixels.par_chunks(AT_ONCE).enumerate();
+        let bad = parts.find_map_first(|(n, part)| {
+            let bad = part.iter().position(|p| !p.iter().all(|c| c.is_finite()))?;
+            Some(n * AT_ONCE + bad)
+        });
+        match bad {
             Some(bad) => Err(StillError::NotFinite { x: bad % self.size.0, y: bad / self.size.0 }),
             None => Ok(()),
         }

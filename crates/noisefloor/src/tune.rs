@@ -33,6 +33,7 @@ use crate::params::Params;
 use crate::rgb::Rgb;
 use crate::stills::{SnapshotPair, Still, StillError, StillWarning, film_of};
 use crate::tile::{Tile, TileError, TileGrid};
+use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 use thiserror::Error;
 
@@ -324,7 +325,9 @@ impl PicturePair {
         other.check()?;
         one.fits(&other)?;
         let mut mean = vec![[0.0; 3]; one.pixels.len()];
-        blend_row([&one.pixels, &other.pixels], [0.5; 2], &mut mean);
+        let rows = one.pixels.par_chunks(size.0).zip(other.pixels.par_chunks(size.0));
+        let rows = rows.zip(mean.par_chunks_mut(size.0));
+        rows.for_each(|((one, other), mean)| blend_row([one, other], [0.5; 2], mean));
         Ok(Self { mean: still(mean, 2.0 * spp), halves: [one, other] })
     }
 
@@ -345,6 +348,11 @@ impl PicturePair {
     /// The mean of both, row-major.
     pub fn mean(&self) -> &[Rgb] {
         &self.mean.pixels
+    }
+
+    /// Both pictures, row-major.
+    pub fn halves(&self) -> [&[Rgb]; 2] {
+        self.halves.each_ref().map(|half| half.pixels.as_slice())
     }
 
     /// The mean, and the two pictures as its halves: a session that has them as the halves of its film judges the same,
@@ -394,13 +402,18 @@ impl PicturePair {
         Excess { pictures: self.digest(), ..excess }
     }
 
-    /// A number that follows from the pictures, whichever comes first (FNV-1a); not 0.
+    /// A number that follows from the pictures, whichever comes first (FNV-1a, of parts and then of their numbers); not 0.
     fn digest(&self) -> u64 {
-        let of_one = |still: &Still| {
-            let bits = still.pixels.iter().flatten().map(|c| u64::from(c.to_bits()));
-            bits.fold(0xcbf2_9ce4_8422_2325, |hash: u64, bits| {
-                (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3)
+        const AT_ONCE: usize = 1 << 14;
+        fn fnv(numbers: impl Iterator<Item = u64>) -> u64 {
+            numbers.fold(0xcbf2_9ce4_8422_2325, |hash, number| {
+                (hash ^ number).wrapping_mul(0x0000_0100_0000_01b3)
             })
+        }
+        let of_part = |part: &[Rgb]| fnv(part.as_flattened().iter().map(|c| u64::from(c.to_bits())));
+        let of_one = |still: &Still| {
+            let parts: Vec<u64> = still.pixels.par_chunks(AT_ONCE).map(of_part).collect();
+            fnv(parts.into_iter())
         };
         let [one, other] = self.halves.each_ref().map(of_one);
         one.wrapping_add(other).max(1)

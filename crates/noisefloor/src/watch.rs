@@ -65,7 +65,7 @@ mod shift;
 mod values;
 
 pub use borders::MixUp;
-pub(crate) use light::check as check_light;
+pub(crate) use light::check_picture;
 pub use light::{ImpossibleLight, LightCheck};
 pub use said::{Encoding, Fault, Precision, Warning};
 pub(crate) use values::PictureValues;

@@ -3,7 +3,7 @@
 use super::{BLOCK, CERTAIN, NOTABLE, SnapshotPair, Still, StillError, StillWarning};
 use crate::display::{Display, luminance};
 use crate::tile::{Tile, TileGrid};
-use crate::watch::{ImpossibleLight, PictureValues, check_light};
+use crate::watch::{ImpossibleLight, PictureValues, check_picture};
 use rayon::prelude::*;
 
 /// Mean difference of a tile from which it may be unlike, as a share of the display's range.
@@ -39,7 +39,7 @@ impl SnapshotPair<'_> {
     /// [`StillError::Light`] and [`StillError::Unlike`], [`StillError::Tile`] if the grid is of another picture.
     pub fn notice(&self, grid: TileGrid) -> Result<Noticed, StillError> {
         let [one, other] = &self.pair;
-        notice((one, other), &self.display, grid)
+        notice([one, other], &self.display, grid)
     }
 
     /// [`Noticed::unlike`] alone.
@@ -48,94 +48,105 @@ impl SnapshotPair<'_> {
     /// If the grid is larger than the pictures.
     pub fn unlike_tiles(&self, grid: TileGrid) -> Vec<bool> {
         let [one, other] = &self.pair;
-        unlike_tiles((one, other), &self.display, grid)
+        Shown::new([one, other], &self.display).unlike_tiles(grid)
     }
 
     /// [`Noticed::warnings`] of the pictures as a whole.
     pub fn warnings(&self) -> Vec<StillWarning> {
         let [one, other] = &self.pair;
-        warnings(one, other, &self.display)
+        Shown::new([one, other], &self.display).warnings()
     }
 }
 
 /// The same of any two pictures of one size.
-fn notice(
-    (image, other): (&Still, &Still),
-    display: &Display,
-    grid: TileGrid,
-) -> Result<Noticed, StillError> {
-    if grid.size() != image.size {
-        return Err(StillError::Tile { tile: grid.tile(grid.len() - 1), size: image.size });
+fn notice(pictures: [&Still; 2], display: &Display, grid: TileGrid) -> Result<Noticed, StillError> {
+    let size = pictures[0].size;
+    if grid.size() != size {
+        return Err(StillError::Tile { tile: grid.tile(grid.len() - 1), size });
     }
-    for picture in [image, other] {
-        check_light(picture.pixels.iter().copied()).map_err(|light| match light {
+    for picture in pictures {
+        check_picture(&picture.pixels).map_err(|light| match light {
             ImpossibleLight::Negative { mean } => StillError::Light(mean),
             // `Still::check` finds the first of them
             ImpossibleLight::NotFinite { .. } => StillError::Nothing,
         })?;
     }
-    let unlike = unlike_tiles((image, other), display, grid);
+    let shown = Shown::new(pictures, display);
+    let unlike = shown.unlike_tiles(grid);
     let tiles = unlike.iter().filter(|unlike| **unlike).count();
     if tiles == grid.len() {
         return Err(StillError::Unlike);
     }
-    let mut all = warnings(image, other, display);
+    let mut all = shown.warnings();
     if tiles > 0 {
         all.push(StillWarning::Unlike { tiles, of: grid.len() });
     }
     Ok(Noticed { warnings: all, unlike })
 }
 
-fn unlike_tiles((image, other): (&Still, &Still), display: &Display, grid: TileGrid) -> Vec<bool> {
-    let light = |still: &Still, pixel: usize| luminance(display.encode(still.pixels[pixel]));
-    let is_unlike = |tile: &Tile| {
-        let rows = tile.rows(image.size.0);
-        let differences: Vec<Vec<f32>> =
-            rows.map(|row| row.map(|p| light(image, p) - light(other, p)).collect()).collect();
-        is_unlike(&differences)
-    };
-    grid.tiles().collect::<Vec<_>>().par_iter().map(is_unlike).collect()
+/// Two pictures, and the luminance Y′ of their pixels as displayed.
+struct Shown<'a> {
+    pictures: [&'a Still; 2],
+    light: [Vec<f32>; 2],
 }
 
-fn warnings(image: &Still, other: &Still, display: &Display) -> Vec<StillWarning> {
-    let neighbours = correlation_of_neighbours(image, other, display).map(StillWarning::Neighbours);
-    let brightness = ratio_of_brightness(image, other).map(StillWarning::Brightness);
-    let mut found: Vec<StillWarning> = neighbours.into_iter().chain(brightness).collect();
-    // What a screen shows is of few bits, and ends at white, as it should
-    if !image.display_referred {
-        let mut values = PictureValues::default();
-        for (&a, &b) in image.pixels.iter().zip(&other.pixels) {
-            values.see(a, b);
-        }
-        found.extend(values.quantised().map(StillWarning::Quantised));
-        found.extend(values.clipped().map(StillWarning::Clipped));
+impl<'a> Shown<'a> {
+    fn new(pictures: [&'a Still; 2], display: &Display) -> Self {
+        let light =
+            |still: &Still| still.pixels.par_iter().map(|&pixel| luminance(display.encode(pixel))).collect();
+        Self { pictures, light: pictures.map(light) }
     }
-    found
-}
 
-fn correlation_of_neighbours(image: &Still, other: &Still, display: &Display) -> Option<f64> {
-    let light = |still: &Still, pixel: usize| f64::from(luminance(display.encode(still.pixels[pixel])));
-    const PAIRS: usize = 2 * (BLOCK - 1) * (BLOCK - 1);
-    // Displays take most of the time, and blocks need not wait for each other there
-    let of_block = |block: Vec<usize>| -> Vec<f64> {
-        block.iter().map(|&pixel| light(image, pixel) - light(other, pixel)).collect()
-    };
-    let all: Vec<Vec<f64>> = blocks(image.size).collect::<Vec<_>>().into_par_iter().map(of_block).collect();
-    let (mut sum, mut squares, mut energy) = (0.0, 0.0, 0.0);
-    for differences in all {
-        let mean = differences.iter().sum::<f64>() / differences.len() as f64;
-        let at = |x: usize, y: usize| differences[y * BLOCK + x] - mean;
-        for (x, y) in (0..BLOCK - 1).flat_map(|y| (0..BLOCK - 1).map(move |x| (x, y))) {
-            for beside in [at(x + 1, y), at(x, y + 1)] {
-                let product = at(x, y) * beside;
-                (sum, squares) = (sum + product, squares + product * product);
+    fn unlike_tiles(&self, grid: TileGrid) -> Vec<bool> {
+        let [one, other] = &self.light;
+        let is_unlike = |tile: &Tile| {
+            let rows = tile.rows(grid.width());
+            let differences: Vec<Vec<f32>> =
+                rows.map(|row| row.map(|pixel| one[pixel] - other[pixel]).collect()).collect();
+            is_unlike(&differences)
+        };
+        grid.tiles().collect::<Vec<_>>().par_iter().map(is_unlike).collect()
+    }
+
+    fn warnings(&self) -> Vec<StillWarning> {
+        let [one, other] = self.pictures;
+        let neighbours = self.correlation_of_neighbours().map(StillWarning::Neighbours);
+        let brightness = ratio_of_brightness(one, other).map(StillWarning::Brightness);
+        let mut found: Vec<StillWarning> = neighbours.into_iter().chain(brightness).collect();
+        // What a screen shows is of few bits, and ends at white, as it should
+        if !one.display_referred {
+            let values = PictureValues::of([&one.pixels, &other.pixels]);
+            found.extend(values.quantised().map(StillWarning::Quantised));
+            found.extend(values.clipped().map(StillWarning::Clipped));
+        }
+        found
+    }
+
+    fn correlation_of_neighbours(&self) -> Option<f64> {
+        const PAIRS: usize = 2 * (BLOCK - 1) * (BLOCK - 1);
+        let [one, other] = &self.light;
+        let of_block = |block: Vec<usize>| {
+            let differences: Vec<f64> =
+                block.iter().map(|&pixel| f64::from(one[pixel]) - f64::from(other[pixel])).collect();
+            let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+            let at = |x: usize, y: usize| differences[y * BLOCK + x] - mean;
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for (x, y) in (0..BLOCK - 1).flat_map(|y| (0..BLOCK - 1).map(move |x| (x, y))) {
+                for beside in [at(x + 1, y), at(x, y + 1)] {
+                    let product = at(x, y) * beside;
+                    (sum, squares) = (sum + product, squares + product * product);
+                }
             }
-        }
-        energy += differences.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>();
+            [sum, squares, differences.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>()]
+        };
+        let all: Vec<[f64; 3]> =
+            blocks(self.pictures[0].size).collect::<Vec<_>>().into_par_iter().map(of_block).collect();
+        let total = |n: usize| all.iter().map(|block| block[n]).sum::<f64>();
+        let [sum, squares, energy] = [0, 1, 2].map(total);
+        // By Hoeffding's bound, as in `watch`, with care: two pairs share each pixel
+        let correlation = sum / PAIRS as f64 / (energy / (BLOCK * BLOCK) as f64);
+        (sum.abs() > CERTAIN * (2.0 * squares).sqrt() && correlation.abs() > NOTABLE).then_some(correlation)
     }
-    // By Hoeffding's bound, as in `watch`, with care: two pairs share each pixel
-    let correlation = sum / PAIRS as f64 / (energy / (BLOCK * BLOCK) as f64);
-    (sum.abs() > CERTAIN * (2.0 * squares).sqrt() && correlation.abs() > NOTABLE).then_some(correlation)
 }
 
 /// Whether rows of differences have a mean that their changes from pixel to pixel do not explain.
@@ -160,15 +171,17 @@ fn blocks((width, height): (usize, usize)) -> impl Iterator<Item = Vec<usize>> {
 /// How many times as bright one picture is as the other, if that is neither chance nor a few pixels.
 fn ratio_of_brightness(one: &Still, other: &Still) -> Option<f64> {
     let light = |still: &Still, pixel: usize| f64::from(luminance(still.pixels[pixel]));
-    let (mut sums, mut squares, mut ratios) = ([0.0; 2], 0.0, Vec::new());
-    for block in blocks(one.size) {
+    let of_block = |block: Vec<usize>| {
         let sum = |still: &Still| block.iter().map(|&pixel| light(still, pixel)).sum::<f64>();
-        let (a, b) = (sum(one), sum(other));
-        squares += block.iter().map(|&p| (light(one, p) - light(other, p)).powi(2)).sum::<f64>();
-        (sums[0], sums[1]) = (sums[0] + a, sums[1] + b);
-        // Black in both says nothing
-        ratios.extend((a > 0.0 || b > 0.0).then_some(a / b));
-    }
+        let squares = block.iter().map(|&p| (light(one, p) - light(other, p)).powi(2)).sum::<f64>();
+        [sum(one), sum(other), squares]
+    };
+    let all: Vec<[f64; 3]> = blocks(one.size).collect::<Vec<_>>().into_par_iter().map(of_block).collect();
+    let total = |n: usize| all.iter().map(|block| block[n]).sum::<f64>();
+    let (sums, squares) = ([total(0), total(1)], total(2));
+    // Black in both says nothing
+    let lit = all.iter().filter(|[a, b, _]| *a > 0.0 || *b > 0.0);
+    let mut ratios: Vec<f64> = lit.map(|[a, b, _]| a / b).collect();
     ratios.sort_by(f64::total_cmp);
     let (mean, median) = (sums[0] / sums[1], *ratios.get(ratios.len() / 2)?);
     let differs =

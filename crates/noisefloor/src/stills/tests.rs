@@ -98,3 +98,31 @@ fn finished_pictures_lack_light_that_one_alone_has_met() {
         assert_eq!(unmet(&shown(&lit), &shown(&other)), 0, "{unit}");
     }
 }
+
+/// Threads look at parts of a picture: what all values have in common is that of all parts.
+#[test]
+fn values_of_large_pictures_are_looked_at_together() {
+    const SIDE: usize = 300;
+    const { assert!(SIDE * SIDE > 1 << 16) }
+    let of_a_byte = |seed: u64| -> Vec<Rgb> {
+        let mut noise = noisefloor_testkit::Noise::keyed(&[23, seed]);
+        (0..SIDE * SIDE)
+            .map(|_| [0; 3].map(|_: u8| (20.0 + 60.0 * noise.uniform() as f32).round() / 255.0))
+            .collect()
+    };
+    let noticed = |last: f32| {
+        let [mut a, b] = [1, 2].map(of_a_byte);
+        a[SIDE * SIDE - 1] = [last; 3];
+        let [a, b] = [a, b].map(|pixels| Still::new((SIDE, SIDE), pixels, 64.0));
+        let pair = SnapshotPair::new(
+            Evidence::Halves,
+            &a,
+            &[&b],
+            ToneMapping::default(),
+            Some(Samples::Independent),
+        );
+        let warnings = pair.unwrap().notice(TileGrid::new(SIDE, SIDE, 64).unwrap()).unwrap().warnings;
+        warnings.contains(&StillWarning::Quantised(Encoding::Linear))
+    };
+    assert!(noticed(50.0 / 255.0) && !noticed(50.4 / 255.0));
+}

@@ -2,6 +2,7 @@
 
 use crate::display::luminance;
 use crate::rgb::Rgb;
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// Share of a tile's pixels that may be non-finite. The film keeps single ones out, and the report counts
@@ -73,6 +74,20 @@ impl LightCheck {
 /// Whether most pixels are finite, and the light of those on average not less than none.
 pub(crate) fn check(pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
     SeenLight::of(pixels).by_itself()
+}
+
+/// The same of a whole picture.
+pub(crate) fn check_picture(pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
+    // Pixels that a thread looks at
+    const AT_ONCE: usize = 1 << 16;
+    let parts = pixels.par_chunks(AT_ONCE).map(|part| SeenLight::of(part.iter().copied()));
+    let and = |sum: SeenLight, part: SeenLight| SeenLight {
+        sum: sum.sum + part.sum,
+        finite: sum.finite + part.finite,
+        all: sum.all + part.all,
+        brightest: sum.brightest.max(part.brightest),
+    };
+    parts.collect::<Vec<_>>().into_iter().fold(SeenLight::default(), and).by_itself()
 }
 
 /// What there is to see in pixels of a tile, apart from all others: luminance, where it is finite.

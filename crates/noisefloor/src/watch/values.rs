@@ -3,6 +3,7 @@
 use super::said::{Encoding, Precision, Warning};
 use crate::display::{luminance, srgb_encode};
 use crate::rgb::Rgb;
+use rayon::prelude::*;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::iter::Sum;
@@ -266,6 +267,9 @@ fn is_white(light: f32) -> bool {
     (light - 1.0).abs() <= 4.0 * f32::EPSILON
 }
 
+/// Pixels that a thread looks at.
+const AT_ONCE: usize = 1 << 16;
+
 /// What the values of two pictures of one view have in common.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PictureValues {
@@ -274,11 +278,25 @@ pub(crate) struct PictureValues {
 }
 
 impl PictureValues {
-    /// Looks at one pixel of both.
-    pub(crate) fn see(&mut self, a: Rgb, b: Rgb) {
-        self.values.see(a);
-        self.values.see(b);
-        self.ends.add(Ends::of(luminance(a), luminance(b)));
+    /// Of two pictures with the same number of pixels.
+    pub(crate) fn of([one, other]: [&[Rgb]; 2]) -> Self {
+        let parts = one.par_chunks(AT_ONCE).zip(other.par_chunks(AT_ONCE));
+        let of_part = |(one, other): (&[Rgb], &[Rgb])| {
+            let mut part = Self::default();
+            for (&a, &b) in one.iter().zip(other) {
+                part.values.see(a);
+                part.values.see(b);
+                part.ends.add(Ends::of(luminance(a), luminance(b)));
+            }
+            part
+        };
+        let parts: Vec<Self> = parts.map(of_part).collect();
+        let mut all = Self::default();
+        for part in parts {
+            all.values.add(&part.values);
+            all.ends.add(part.ends);
+        }
+        all
     }
 
     /// How all values are 8-bit numbers, if they are and have noise: an unlit texture may be of them.
