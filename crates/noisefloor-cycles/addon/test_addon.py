@@ -1030,13 +1030,21 @@ class Addon(unittest.TestCase):
         finally:
             denoise.gpu = real
         self.assertGreater(len(looks(tune.Search(scene))), 1)
-        # What a GPU gets by way of its own memory is what the processor reads where it is
+        # What a GPU gets by way of its own memory, and keeps for the next picture, is what the processor reads where it lies:
+        # from the bottom, beside an alpha that is left alone
         random = numpy.random.default_rng(4)
-        picture = numpy.float32(random.uniform(0, 1, (64, 96, 3)))
-        device = denoise._Device(library, denoise.CPU)
-        both = [device.run({"color": picture}, "color", ["hdr"], shared) for shared in (True, False)]
-        numpy.testing.assert_array_equal(*both)
-        self.assertGreater(numpy.abs(both[0] - picture).mean(), 0.01)
+        with_alpha = [numpy.float32(random.uniform(0, 1, (64, 96, 4)))[::-1] for _ in range(3)]
+        one, albedo, other = (picture[..., :3] for picture in with_alpha)
+        normal = numpy.float32(random.uniform(-1, 1, (64, 96, 3)))
+        own, away = (denoise.Denoiser(library, denoise.CPU, shared) for shared in (True, False))
+        for colour, *guides in [(one,), (one, albedo, normal), (other, albedo, normal), (other[8:40],), (one,)]:
+            made = own.denoise(colour, *guides)
+            numpy.testing.assert_array_equal(made, away.denoise(colour, *guides))
+            self.assertGreater(numpy.abs(made - colour).mean(), 0.01)
+            upright = [numpy.ascontiguousarray(picture[::-1]) for picture in (colour, *guides)]
+            numpy.testing.assert_array_equal(made, denoise.Denoiser(library).denoise(*upright)[::-1])
+        with self.assertRaisesRegex(RuntimeError, "Open Image Denoise: "):
+            own.denoise(one, None, normal)
 
 
 def looks(search):

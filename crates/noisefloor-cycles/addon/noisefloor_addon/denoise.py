@@ -53,19 +53,99 @@ def gpu(scene):
     return kind if kind != "NONE" and any(each.use and each.type == kind for each in own.preferences.devices) else None
 
 
-def denoise(path, colour, albedo=None, normal=None, kind=CPU):
-    """colour, albedo, normal: float32 of shape (height, width, 3). Albedo and normals are denoised first, as
-    Cycles does. kind: as `device` says.
+class Denoiser:
+    """Open Image Denoise on a device, as `device` says. As long as it lives, a GPU keeps filters and memory, which take it long
+    to make; the processor makes them anew, and has its memory to itself while Cycles renders."""
 
-    Raises RuntimeError with what OIDN says."""
-    made = _Device(path, kind)
-    guides = {
-        name: picture
-        for name, picture in [("albedo", albedo), ("normal", normal)]
-        if picture is not None
-    }
-    guides = {name: made.run({name: picture}, name, []) for name, picture in guides.items()}
-    return made.run({"color": colour, **guides}, "color", ["hdr", *(["cleanAux"] if guides else [])])
+    def __init__(self, path, kind=CPU, shared=None):
+        """shared: whether the device reads this process' memory, as every one of the processor does; others have their own."""
+        self.filters, self.buffers = {}, {}
+        self.device = _Device(path, kind)
+        self.shared = kind == CPU if shared is None else shared
+
+    def __del__(self):
+        self._release()
+
+    def denoise(self, colour, albedo=None, normal=None):
+        """float32 of shape (height, width, 3), or such a part of larger arrays. Albedo and normals are denoised first, as Cycles
+        does.
+
+        Raises RuntimeError with what OIDN says."""
+        # OIDN takes rows by their distance, which is not negative: a picture that lies from the bottom is denoised so
+        rows = slice(None, None, -1 if colour.strides[0] < 0 else 1)
+        given = {"color": colour, "albedo": albedo, "normal": normal}
+        given = {role: _laid(picture[rows]) for role, picture in given.items() if picture is not None}
+        made = numpy.empty(given["color"].shape, numpy.float32)
+        try:
+            images = {role: self._image(role, picture) for role, picture in given.items()}
+            guides = [role for role in images if role != "color"]
+            for role in guides:
+                clean = self._image(f"clean {role}", numpy.empty_like(made), write=False)
+                self._run({role: images[role], "output": clean}, [])
+                images[role] = clean
+            output = self._image("output", made, write=False)
+            self._run({**images, "output": output}, ["hdr", *(["cleanAux"] if guides else [])])
+            if not self.shared:
+                oidn, buffer = self.device.oidn, output[1]
+                data, size = ctypes.c_void_p(made.ctypes.data), ctypes.c_size_t(made.nbytes)
+                oidn.oidnReadBuffer(buffer, ctypes.c_size_t(0), size, data)
+                self.device.check()
+        finally:
+            if self.shared:
+                self._release()
+        return made[rows]
+
+    def _image(self, role, picture, write=True):
+        """A picture, and the device's memory that has it; None where the device reads ours."""
+        if self.shared:
+            return picture, None
+        oidn, device = self.device.oidn, self.device
+        last = picture.strides[0] * (picture.shape[0] - 1) + picture.strides[1] * (picture.shape[1] - 1)
+        size = ctypes.c_size_t(last + 3 * picture.itemsize)
+        buffer, had = self.buffers.get(role, (None, 0))
+        if had != size.value:
+            if buffer:
+                oidn.oidnReleaseBuffer(buffer)
+            buffer = ctypes.c_void_p(oidn.oidnNewBuffer(device.handle, size))
+            self.buffers[role] = buffer, size.value
+            device.check()
+        if write:
+            oidn.oidnWriteBuffer(buffer, ctypes.c_size_t(0), size, ctypes.c_void_p(picture.ctypes.data))
+        return picture, buffer
+
+    def _run(self, images, flags):
+        """Runs the filter for images of these roles, which is made if there is none."""
+        oidn, device, roles = self.device.oidn, self.device, tuple(images)
+        filtered = self.filters.get(roles)
+        if filtered is None:
+            filtered = self.filters[roles] = ctypes.c_void_p(oidn.oidnNewFilter(device.handle, b"RT"))
+            set_flag = getattr(oidn, "oidnSetFilterBool", None) or oidn.oidnSetFilter1b
+            for flag in flags:
+                set_flag(filtered, flag.encode(), ctypes.c_bool(True))
+        for role, (picture, buffer) in images.items():
+            (height, width, _), (down, across, _) = picture.shape, picture.strides
+            layout = [ctypes.c_size_t(number) for number in (width, height, 0, across, down)]
+            if buffer:
+                oidn.oidnSetFilterImage(filtered, role.encode(), buffer, FLOAT3, *layout)
+            else:
+                data = ctypes.c_void_p(picture.ctypes.data)
+                oidn.oidnSetSharedFilterImage(filtered, role.encode(), data, FLOAT3, *layout)
+        oidn.oidnCommitFilter(filtered)
+        oidn.oidnExecuteFilter(filtered)
+        device.check()
+
+    def _release(self):
+        for filtered in self.filters.values():
+            self.device.oidn.oidnReleaseFilter(filtered)
+        for buffer, _ in self.buffers.values():
+            self.device.oidn.oidnReleaseBuffer(buffer)
+        self.filters, self.buffers = {}, {}
+
+
+def _laid(picture):
+    """A picture whose pixels lie one after the other, at any distance."""
+    whole = picture.dtype == numpy.float32 and picture.strides[2] == 4 and min(picture.strides) > 0
+    return picture if whole else numpy.ascontiguousarray(picture, numpy.float32)
 
 
 class _Device:
@@ -84,11 +164,11 @@ class _Device:
         if kind != CPU and not hasattr(self.oidn, "oidnWriteBuffer"):
             raise RuntimeError("Open Image Denoise before 2.0 knows no GPUs")
         self.handle = ctypes.c_void_p(self.oidn.oidnNewDevice(kind))
+        self.check()
         if not self.handle:
-            self.check(None)
             raise RuntimeError("Open Image Denoise cannot use this GPU")
         self.oidn.oidnCommitDevice(self.handle)
-        self.check(self.handle)
+        self.check()
         if kind != CPU:
             self.kept[kind] = self.handle
 
@@ -96,44 +176,9 @@ class _Device:
         if self.kind == CPU and getattr(self, "handle", None):
             self.oidn.oidnReleaseDevice(self.handle)
 
-    def check(self, handle):
-        message = ctypes.c_char_p()
+    def check(self):
+        """Raises what has gone wrong: of the device, or, without one, of making it."""
+        message, handle = ctypes.c_char_p(), self.handle or None
         if self.oidn.oidnGetDeviceError(handle, ctypes.byref(message)) != 0:
             said = (message.value or b"an error").decode(errors="replace")
             raise RuntimeError(f"Open Image Denoise: {said}")
-
-    def run(self, pictures, result, flags, shared=None):
-        """shared: whether the device reads this process' memory, as every one of the processor does; others have their own."""
-        shared = self.kind == CPU if shared is None else shared
-        oidn, filtered = self.oidn, ctypes.c_void_p(self.oidn.oidnNewFilter(self.handle, b"RT"))
-        pictures = {name: numpy.ascontiguousarray(picture, numpy.float32) for name, picture in pictures.items()}
-        pictures["output"] = numpy.empty_like(pictures[result])
-        height, width = pictures["output"].shape[:2]
-        layout = [ctypes.c_size_t(number) for number in (width, height, 0, 0, 0)]
-        buffers = {}
-        try:
-            for name, picture in pictures.items():
-                data, size = ctypes.c_void_p(picture.ctypes.data), ctypes.c_size_t(picture.nbytes)
-                if shared:
-                    oidn.oidnSetSharedFilterImage(filtered, name.encode(), data, FLOAT3, *layout)
-                    continue
-                buffers[name] = ctypes.c_void_p(oidn.oidnNewBuffer(self.handle, size))
-                self.check(self.handle)
-                if name != "output":
-                    oidn.oidnWriteBuffer(buffers[name], ctypes.c_size_t(0), size, data)
-                oidn.oidnSetFilterImage(filtered, name.encode(), buffers[name], FLOAT3, *layout)
-            set_flag = getattr(oidn, "oidnSetFilterBool", None) or oidn.oidnSetFilter1b
-            for flag in flags:
-                set_flag(filtered, flag.encode(), ctypes.c_bool(True))
-            oidn.oidnCommitFilter(filtered)
-            oidn.oidnExecuteFilter(filtered)
-            if not shared:
-                made = pictures["output"]
-                data, size = ctypes.c_void_p(made.ctypes.data), ctypes.c_size_t(made.nbytes)
-                oidn.oidnReadBuffer(buffers["output"], ctypes.c_size_t(0), size, data)
-        finally:
-            oidn.oidnReleaseFilter(filtered)
-            for buffer in buffers.values():
-                oidn.oidnReleaseBuffer(buffer)
-        self.check(self.handle)
-        return pictures["output"]

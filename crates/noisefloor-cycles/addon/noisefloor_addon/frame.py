@@ -4,6 +4,7 @@ until nobody sees what is wrong with all of them together.
 The threshold says where samples go, pixel by pixel; noisefloor says when they are enough, and in which squares of the
 picture more are needed. Every sample counts in the end."""
 
+import concurrent.futures
 import hashlib
 import math
 import time
@@ -42,6 +43,12 @@ def cells(region):
     return slice(y // CELL, -(-(y + height) // CELL)), slice(x // CELL, -(-(x + width) // CELL))
 
 
+def _of_cells(of, values):
+    """What a function of numpy makes of the values in each cell."""
+    down, across = (numpy.arange(0, side, CELL) for side in values.shape)
+    return of.reduceat(of.reduceat(values, down, 0), across, 1)
+
+
 class Frame:
     """engine: Cycles' RenderEngine, which Blender has asked for a layer. cycles: renders what the evaluated
     scene says. shown: how the picture is displayed, see display.py.
@@ -74,7 +81,7 @@ class Frame:
         catches = any(instance.object.is_shadow_catcher for instance in depsgraph.object_instances)
         self.judge = judging.Judge(self.scene, shown, self.film, self.denoises, catches)
         self.tuning = noisefloor.Tuning(threshold=(COARSEST, FINEST))
-        self.halves = passes.Sums(*self.size), passes.Sums(*self.size)
+        self.halves = passes.Means(*self.size), passes.Means(*self.size)
         # The sum of 1/threshold² of the pictures that each cell has, and how far it is from what may be seen
         down, across = -(-self.size[1] // CELL), -(-self.size[0] // CELL)
         self.effort, self.ratio = numpy.zeros((down, across)), numpy.full((down, across), numpy.inf)
@@ -85,7 +92,7 @@ class Frame:
         # Samples, over all pixels, and how many of them are expected in the end
         self.begun, self.sampled, self.expected = time.monotonic(), 0, None
         # What the windows draw meanwhile, and how often it has changed
-        self.shown, self.shows = numpy.zeros((*self.size[::-1], 4), numpy.float32), 0
+        self.shown, self.shows = passes.upright((*self.size[::-1], 4)), 0
         self._add_passes(depsgraph)
 
     def _film(self):
@@ -149,7 +156,7 @@ class Frame:
             return "max-spp"
         parts = self._parts(jobs)
         self.thresholds.append(each)
-        for half, sums in enumerate(self.halves):
+        for half, means in enumerate(self.halves):
             for number, (region, threshold, samples) in enumerate(parts):
                 left = 0.0
                 if self.settings.time_limit > 0:
@@ -163,8 +170,8 @@ class Frame:
                 pictures, counts = self._sample(region, half, threshold, samples, left)
                 cancelled = self._cancelled()
                 # The last picture may be incomplete then: better than none
-                if not cancelled or not sums.samples.any():
-                    sums.add(region, counts, pictures)
+                if not cancelled or not means.samples.any():
+                    means.add(region, counts, pictures)
                     self.sampled += float(counts.sum())
                 if cancelled:
                     return "cancelled"
@@ -180,10 +187,11 @@ class Frame:
         as good as after one picture with the threshold `each`; others get as much less as they are better."""
         jobs = []
         target, first = 1 / each**2, 0.5 / COARSEST**2
+        most = _of_cells(numpy.maximum, numpy.maximum(*(half.samples[..., 0] for half in self.halves)))
         for cell in zip(*numpy.nonzero(self.ratio > 1)):
             y, x = (int(place) * CELL for place in cell)
             width, height = min(CELL, self.size[0] - x), min(CELL, self.size[1] - y)
-            samples = self._room((x, y, width, height))
+            samples = self.settings.max_samples // 2 - int(most[cell])
             wanted = target
             if self.excess is not None and self.excess.ratio < math.inf:
                 share = math.log(self.ratio[cell] / AIM) / math.log(self.excess.ratio / AIM)
@@ -246,7 +254,7 @@ class Frame:
 
     def _verdict(self):
         """What is wrong where; returns why to end, if so."""
-        self.excess = self.judge.excess([half.means() for half in self.halves])
+        self.excess = self.judge.excess([half.means for half in self.halves])
         self.ratio[:] = 0
         for x, y, width, height, ratio in self.excess.squares():
             here = cells((x, y, width, height))
@@ -257,9 +265,7 @@ class Frame:
         self.tuning.tell(self.excess.ratio, alone=self.excess.ratio)
         if self.on_gpu:
             known = sum(half.samples for half in self.halves)[..., 0] / 2
-            edges = [numpy.arange(0, side, CELL) for side in known.shape]
-            of_cell = numpy.add.reduceat(numpy.add.reduceat(known, edges[0], 0), edges[1], 1) / CELL**2
-            self.rate = of_cell / numpy.maximum(self.effort, 1)
+            self.rate = _of_cells(numpy.add, known) / CELL**2 / numpy.maximum(self.effort, 1)
         # What fails by so much needs the square of that as many samples, as far as it is noise
         spp = sum(half.samples for half in self.halves)[..., 0]
         times = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2, numpy.ones((CELL, CELL)))
@@ -293,33 +299,43 @@ class Frame:
         """Brings the picture that people look at up to date."""
         x, y, width, height = region
         here = slice(y, y + height), slice(x, x + width)
-        samples = sum(half.samples[here] for half in self.halves)
-        sums = sum(half.sums["Combined"][here] for half in self.halves if half.sums)
-        self.shown[here] = sums / numpy.maximum(samples, 1)
+        first, second = self.halves
+        if second.means:
+            share = second.samples[here] / numpy.maximum(first.samples[here] + second.samples[here], 1)
+            passes.blend(*(half.means["Combined"][here] for half in self.halves), share, self.shown[here])
+        else:
+            self.shown[here] = first.means["Combined"][here]
         self.shows += 1
 
     def finish(self):
         """Puts all passes into the result, with the two maps; returns the maps."""
-        both = passes.Sums.joined(*self.halves)
-        pictures, spp = both.means(), both.samples[..., 0]
+        both = passes.Means.joined(*self.halves)
+        pictures, spp = both.means, both.samples[..., 0]
         if pictures and self.denoises:
             for name, letters, noisy in DENOISED:
                 if name in pictures:
-                    pictures[noisy] = pictures[name].copy()
+                    pictures[noisy] = pictures[name]
                     self.engine.add_pass(noisy, len(letters), letters, layer=self.layer)
-        if pictures and self.judge.library:
-            pictures["Combined"] = self.judge.denoise(pictures)
-            if "Shadow Catcher" in pictures:
-                pictures["Shadow Catcher"] = self.judge.denoise_alone(pictures["Shadow Catcher"])
+        with concurrent.futures.ThreadPoolExecutor(1) as beside:
+            # One thread says what is lost where, while the others denoise, or a GPU does
+            left = beside.submit(self._left)
+            if pictures and self.judge.library:
+                pictures["Combined"] = self.judge.denoise(pictures)
+                if "Shadow Catcher" in pictures:
+                    pictures["Shadow Catcher"] = self.judge.denoise_alone(pictures["Shadow Catcher"])
+            left = left.result()
         pictures[COUNT] = spp / max(spp.max(), 1)
-        left = numpy.full(self.size[::-1], numpy.nan, numpy.float32)
-        if self.excess is not None:
-            left = self.excess.map()
         maps = {SAMPLES: spp, LOST if self.judge.library else NOISE: numpy.nan_to_num(left)}
         for name in maps:
             self.engine.add_pass(name, 1, "X", layer=self.layer)
         passes.write(self.engine, self.layer, {**pictures, **maps})
         return spp, left
+
+    def _left(self):
+        """What is left of what may be seen, or has been lost, pixel by pixel."""
+        if self.excess is None:
+            return numpy.full(self.size[::-1], numpy.nan, numpy.float32)
+        return self.excess.map()
 
     def progress(self):
         """Share of the samples that are taken, and seconds left; None while unknown."""

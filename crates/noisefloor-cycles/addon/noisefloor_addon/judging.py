@@ -20,7 +20,8 @@ class Judge:
         self.settings, self.film, self.catches = scene.noisefloor, film, catches
         self.library = denoise.library() if denoised else None
         # What denoises, and why it is not what the scene says
-        self.device, self.note = denoise.device(scene, self.library) if self.library else (denoise.CPU, None)
+        device, self.note = denoise.device(scene, self.library) if self.library else (denoise.CPU, None)
+        self.denoiser = denoise.Denoiser(self.library, device) if self.library else None
         self.transparent = scene.render.film_transparent
         self.oracle = settings.oracle(self.settings)
         self.params = settings.params(scene, shown, film)
@@ -28,19 +29,20 @@ class Judge:
 
     def denoise(self, passes):
         """The denoised picture, with alpha, of passes by name."""
-        made = passes["Combined"].copy()
-        made[..., :3] = denoise.denoise(
-            self.library, passes["Combined"][..., :3], passes.get(ALBEDO), passes.get(NORMAL), self.device
-        )
+        made = passes["Combined"].copy(order="K")
+        made[..., :3] = self._colours(passes)
         if self.catches and self.transparent:
             # Cycles does so with the light that a catcher lacks, of which alpha follows
             alpha = numpy.repeat(passes["Combined"][..., 3:], 3, axis=2)
             made[..., 3] = numpy.clip(self.denoise_alone(alpha)[..., 0], 0, 1)
         return made
 
+    def _colours(self, passes):
+        return self.denoiser.denoise(passes["Combined"][..., :3], passes.get(ALBEDO), passes.get(NORMAL))
+
     def denoise_alone(self, picture):
         """A picture of three channels, denoised by itself: its edges are not those of albedo and normals."""
-        return denoise.denoise(self.library, picture, kind=self.device)
+        return self.denoiser.denoise(picture)
 
     def seen(self, picture):
         """A picture with alpha, as it is judged."""
@@ -51,7 +53,11 @@ class Judge:
         """How far the mean of two pictures, passes by name each, is from what may be seen; the time of the denoiser and
         of the vision model."""
         noisy = [self.seen(passes["Combined"]) for passes in pair]
-        denoised = tuple(self.seen(self.denoise(passes)) for passes in pair) if self.library else None
+        denoised = None
+        if self.library:
+            # Alpha is looked at only where something shows through
+            made = self.denoise if self.transparent else self._colours
+            denoised = tuple(self.seen(made(passes)) for passes in pair)
         try:
             return noisefloor.excess(
                 *noisy, oracle=self.oracle, params=self.params, denoised=denoised, lost=self.settings.lost

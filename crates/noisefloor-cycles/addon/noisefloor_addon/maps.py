@@ -1,6 +1,7 @@
 """Heat maps, and PNG files without Blender: files are written while it renders, in a thread where its images
 are out of bounds."""
 
+import math
 import struct
 import zlib
 
@@ -12,21 +13,26 @@ RAMP = numpy.array(
 )
 
 
+# The same in steps that nobody tells apart, as many as a byte has numbers; and grey, where there is nothing
+COLOURS = numpy.stack(
+    [numpy.interp(numpy.arange(256) / 51, numpy.arange(len(RAMP)), RAMP[:, channel]).round() for channel in range(3)], -1
+)
+COLOURS = numpy.concatenate([COLOURS, [[128, 128, 128]]]).astype(numpy.uint8)
+
+
 def heat(values, low, high):
     """Colours (height, width, 3), uint8, of values on a logarithmic scale from low to high; grey where there
     are none."""
     known = numpy.isfinite(values) & (values > 0)
-    logs = numpy.log2(numpy.where(known, values, low) / low)
-    place = numpy.clip(logs / max(numpy.log2(high / low), 1e-9), 0, 1) * (len(RAMP) - 1)
-    steps = numpy.arange(len(RAMP))
-    colours = numpy.stack([numpy.interp(place, steps, RAMP[:, channel]) for channel in range(3)], -1)
-    return numpy.where(known[..., None], colours.round(), 128).astype(numpy.uint8)
+    logs = numpy.log2(numpy.where(known, values, low) / low, dtype=numpy.float32)
+    place = numpy.clip(logs / max(math.log2(high / low), 1e-9), 0, 1) * 255
+    return COLOURS[numpy.where(known, place.round(), 256).astype(numpy.uint16)]
 
 
 def samples_map(spp):
     """Heat map of samples per pixel, from the fewest to the most."""
     some = spp[spp > 0]
-    return heat(spp.astype(float), *((some.min(), max(some.max(), some.min() * 2)) if some.size else (1, 2)))
+    return heat(spp, *((float(some.min()), float(max(some.max(), some.min() * 2))) if some.size else (1, 2)))
 
 
 def left_map(left, denoised, settings):
