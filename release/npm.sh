@@ -11,12 +11,12 @@ empty=$(mktemp -d)
 trap 'rm -rf "$empty"' EXIT
 mkdir "$empty/package"
 # Links to licences become files, which npm would leave out
-cp -L "$js"/{package.json,README.md,LICENSE-*,noisefloor.*,background.*,worker.js} "$empty/package"
+cp -L "$js"/{package.json,README.md,LICENSE-*,noisefloor.*,background.*,pixels.js,worker.js} "$empty/package"
 file=$(cd "$empty/package" && npm pack --silent --pack-destination "$folder")
 cd "$empty"
 echo '{ "type": "module" }' >package.json
 npm install --silent --no-audit --no-fund --ignore-scripts "$folder/$file"
-for name in noisefloor.js noisefloor.d.ts noisefloor.wasm background.js background.d.ts worker.js LICENSE-APACHE LICENSE-MIT README.md; do
+for name in noisefloor.js noisefloor.d.ts pixels.js noisefloor.wasm background.js background.d.ts worker.js LICENSE-APACHE LICENSE-MIT README.md; do
     [ -s "node_modules/noisefloor/$name" ] || { echo "$file lacks $name"; exit 1; }
 done
 node --input-type module --eval '

@@ -1,5 +1,5 @@
-// The example as Vite builds it, the package without a bundler, and its tone curves against three.js' own
-// shader: in Chromium, whose SwiftShader needs no GPU.
+// The example as Vite builds it, on WebGL 2 and on WebGPU, the package without a bundler, and its tone curves against
+// three.js' own shader: in Chromium, whose SwiftShader needs no GPU.
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
@@ -54,7 +54,11 @@ before(async () => {
   });
   await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
   address = `http://127.0.0.1:${server.address().port}`;
-  browser = await chromium.launch({
+  browser = await launch();
+});
+
+function launch(...more) {
+  return chromium.launch({
     executablePath: "/usr/bin/chromium",
     args: [
       "--headless",
@@ -66,17 +70,18 @@ before(async () => {
       "--use-angle=swiftshader",
       "--enable-unsafe-swiftshader",
       "--ignore-gpu-blocklist",
+      ...more,
     ],
   });
-});
+}
 after(async () => {
   await browser?.close();
   server?.close();
 });
 
 /** A page on which nothing may go wrong. */
-async function open(t, path, options) {
-  const page = await browser.newPage(options);
+async function open(t, path, in_ = browser) {
+  const page = await in_.newPage();
   const wrong = [];
   page.on("pageerror", (error) => wrong.push(String(error)));
   page.on("console", (message) => message.type() === "error" && wrong.push(message.text()));
@@ -112,6 +117,59 @@ test("a model is rendered until nobody sees noise", async (t) => {
   if (process.env.NOISEFLOOR_SCREENSHOTS) {
     await page.screenshot({ path: join(process.env.NOISEFLOOR_SCREENSHOTS, "three-gpu-pathtracer.png") });
   }
+});
+
+/** What a page is done with: states, and the mean of each of 8x8 blocks. */
+async function rendered(page) {
+  await page.waitForFunction(() => window.noisefloor?.error || window.noisefloor?.isDone);
+  return page.evaluate(async () => {
+    const { session, states, warnings, error, device } = window.noisefloor;
+    const blocks = Array(64).fill(0);
+    const { width, height } = session;
+    (await session.image()).forEach((value, i) => {
+      const [x, y] = [Math.floor(i / 3) % width, Math.floor(i / 3 / width)];
+      blocks[8 * Math.floor((8 * y) / height) + Math.floor((8 * x) / width)] += (value * 64) / (3 * width * height);
+    });
+    return { states, warnings, error, device, blocks };
+  });
+}
+
+test("on WebGPU, the same picture stops as well", async (t) => {
+  // SwiftShader for Vulkan, too: a device of any other kind cannot show its picture here, and is lost
+  const withGpu = await launch("--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader");
+  t.after(() => withGpu.close());
+  const page = await open(t, "/plain", withGpu);
+  if (!(await page.evaluate(async () => Boolean(await navigator.gpu?.requestAdapter())))) {
+    return t.skip("this Chromium has no WebGPU device");
+  }
+  const query = "/example/index.html?size=40&tile=40&distance=2"; // rows of 640 bytes, of which 768 are read
+  const [gpu, gl] = [await open(t, query, withGpu), await open(t, `${query}&webgl`)];
+  const [there, here] = [await rendered(gpu), await rendered(gl)];
+  for (const { states, warnings, error, device } of [there, here]) {
+    console.log(`${device}: ${states.map(({ spp, reason }) => `${reason} at ${spp}`)}; ${error ?? warnings.join()}`);
+    assert.equal(error, undefined);
+    assert.deepEqual(warnings, []);
+    assert.ok(states.every(({ reason, spp }) => reason === "converged" && spp >= 50));
+  }
+  assert.deepEqual([there.device, here.device], ["WebGPU", "WebGL"]);
+  // The two path tracers differ by some percent: not by rows from the other end, or read beside their place
+  const apart = (blocks) => Math.max(...blocks.map((value, i) => Math.abs(value / here.blocks[i] - 1)));
+  const flipped = there.blocks.map((_, i) => there.blocks[8 * (7 - (i >> 3)) + (i & 7)]);
+  console.log(`blocks differ by ${apart(there.blocks)}, flipped by ${apart(flipped)}`);
+  assert.ok(apart(there.blocks) < 0.3 && apart(flipped) > 0.6);
+});
+
+test("running means in half floats are noticed before a tile stops", async (t) => {
+  const page = await open(t, "/example/index.html?size=64&tile=64&distance=2&half");
+  // In floats, tiles stop at 104 to 112
+  await page.waitForFunction(() => {
+    const { error, states } = window.noisefloor ?? {};
+    return error || states?.every(({ spp, reason }) => spp >= 150 || reason !== "open");
+  });
+  const { states, warnings, error } = await page.evaluate(() => window.noisefloor);
+  console.log(`after ${states.map(({ spp }) => spp)} samples: ${error ?? warnings.join("; ")}`);
+  assert.match(warnings.join(), /half floats/);
+  assert.ok(states.every(({ reason }) => reason === "open"));
 });
 
 test("no bundler is needed, in a page and in a worker", async (t) => {

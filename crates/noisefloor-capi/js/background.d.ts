@@ -1,6 +1,6 @@
 /** A session in a worker, so that the page never waits for a verdict. */
 
-import type { Layout, SessionOptions, TileState } from "./noisefloor.js";
+import type { Layout, Pixels, SessionOptions, TileState } from "./noisefloor.js";
 
 export interface BackgroundOptions extends SessionOptions {
   /** Passes that may wait behind the one that is being judged: 1 unless given, and at least 1. */
@@ -38,15 +38,20 @@ export class BackgroundSession {
   readonly states: readonly TileState[];
   /** What is likely to be wrong with the samples, as of the last pass that was judged. */
   readonly warnings: readonly string[];
-  /** An array for the next pass: one that the worker has read, if there is one. What is in it is of no use. */
-  buffer(floats: number): Float32Array;
   /**
-   * Hands over the mean of `spp` new samples per pixel, to be judged. A Float32Array goes to the worker without a copy,
-   * and cannot be used here any more: take the next one from `buffer`.
+   * An array for the next pass: one that the worker has read, if there is one. What is in it is of no use. A Uint16Array
+   * holds the bits of half floats.
    */
-  push(pixels: ArrayLike<number>, batch: Layout & { spp: number }): Promise<void>;
+  buffer(values: number): Float32Array;
+  buffer(values: number, kind: typeof Uint16Array): Uint16Array;
+  /**
+   * Hands over the mean of `spp` new samples per pixel, to be judged. A Float32Array, or a Uint16Array of half floats, goes
+   * to the worker without a copy, and cannot be used here any more: take the next one from `buffer`. What is no radiance is
+   * an error "ARGUMENT", as of `Session`.
+   */
+  push(pixels: Pixels, batch: Layout & { spp: number }): Promise<void>;
   /** The same with the mean of all `spp` samples per pixel so far. */
-  pushRunning(pixels: ArrayLike<number>, batch: Layout & { spp: number }): Promise<void>;
+  pushRunning(pixels: Pixels, batch: Layout & { spp: number }): Promise<void>;
   /** When no pass waits: where all tiles stand. */
   finish(): Promise<readonly TileState[]>;
   /** As those of `Session`, behind the passes that were handed over. */

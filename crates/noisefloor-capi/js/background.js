@@ -2,6 +2,7 @@
 // documents what is exported; worker.js is the other end.
 
 import { NoisefloorError, toneTable } from "./noisefloor.js";
+import { decoded, whyNoRadiance } from "./pixels.js";
 
 const node = globalThis.process?.getBuiltinModule?.("node:worker_threads");
 
@@ -17,14 +18,14 @@ function clonable({ toneMapping, onWarning, ...options }) {
   return { ...options, toneMapping: { ...toneMapping, curve: toneTable(toneMapping.curve) } };
 }
 
-/** Floats of their own, which can be handed over without a copy. */
-function owned(pixels) {
-  const whole = pixels instanceof Float32Array && pixels.byteLength === pixels.buffer.byteLength;
-  return whole ? pixels : Float32Array.from(pixels);
+/** Values of their own, which can be handed over without a copy. */
+function owned(pixels, Kind) {
+  const whole = pixels instanceof Kind && pixels.byteLength === pixels.buffer.byteLength;
+  return whole ? pixels : Kind.from(pixels);
 }
 
 const sameLayout = (a, b) =>
-  ["running", "tile", "channels", "stride", "fromBottom"].every((key) => a[key] === b[key]) &&
+  ["running", "tile", "channels", "stride", "fromBottom", "halfFloats"].every((key) => a[key] === b[key]) &&
   a.pixels.length === b.pixels.length;
 
 /** One pass of all samples of two; a running mean has those before in it. */
@@ -111,22 +112,29 @@ export class BackgroundSession {
     return this.#state.warnings;
   }
 
-  buffer(floats) {
-    const place = this.#spent.findIndex((pixels) => pixels.length === floats);
-    return place < 0 ? new Float32Array(floats) : this.#spent.splice(place, 1)[0];
+  buffer(values, Kind = Float32Array) {
+    const place = this.#spent.findIndex((pixels) => pixels.length === values && pixels instanceof Kind);
+    return place < 0 ? new Kind(values) : this.#spent.splice(place, 1)[0];
   }
 
   push(pixels, batch) {
-    return this.#push({ ...batch, pixels: owned(pixels), running: false });
+    return this.#push({ ...batch, pixels, running: false });
   }
 
   pushRunning(pixels, batch) {
-    return this.#push({ ...batch, pixels: owned(pixels), running: true });
+    return this.#push({ ...batch, pixels, running: true });
   }
 
   async #push(pass) {
     if (this.#failed) throw this.#failed;
     if (typeof pass.tile === "object") pass.tile = pass.tile.index;
+    const wrong = whyNoRadiance(pass.pixels, pass.halfFloats);
+    if (wrong) throw new NoisefloorError("ARGUMENT", wrong);
+    if (pass.halfFloats && this.#merges && !pass.running) {
+      // Bits cannot be added up
+      [pass.pixels, pass.halfFloats] = [decoded(pass.pixels), false];
+    }
+    pass.pixels = owned(pass.pixels, pass.halfFloats ? Uint16Array : Float32Array);
     if (this.#merges && this.#held && sameLayout(this.#held, pass)) {
       const before = this.#held;
       this.#held = merged(before, pass);

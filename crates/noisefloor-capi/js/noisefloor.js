@@ -1,5 +1,7 @@
 // noisefloor for JavaScript: sessions, over the WebAssembly of noisefloor-capi. noisefloor.d.ts documents
-// what is exported. In this order: the module and its memory, errors, viewing, tone mappings, pixels, sessions.
+// what is exported. In this order: the module and its memory, errors, viewing, tone mappings, sessions.
+
+import { decoded, whyNoRadiance } from "./pixels.js";
 
 /** The module: what noisefloor.h declares, and `nf_alloc` and `nf_dealloc`. */
 let wasm = null;
@@ -316,47 +318,6 @@ export function toneTable(curve) {
   return tables.get(curve);
 }
 
-// Pixels
-
-/** Names of arrays whose elements are radiance, from whatever page or worker they come. */
-const FLOATS = ["Float32Array", "Float64Array", "Float16Array"];
-
-/** Of all bits of half floats, the numbers. */
-let halves = null;
-
-function halfTable() {
-  return Float32Array.from({ length: 1 << 16 }, (_, bits) => {
-    const [exponent, digits] = [(bits >> 10) & 31, bits & 1023];
-    const size = exponent ? 2 ** (exponent - 25) * (1024 + digits) : 2 ** -24 * digits;
-    return (bits >> 15 ? -1 : 1) * (exponent < 31 ? size : digits ? NaN : Infinity);
-  });
-}
-
-/** Radiance, of which integers, bits of half floats and text would silently become something else. */
-function radiance(pixels, halfFloats) {
-  const kind = Object.prototype.toString.call(pixels).slice(8, -1);
-  if (halfFloats) {
-    if (kind !== "Uint16Array") {
-      throw new NoisefloorError("ARGUMENT", `half floats come as the bits in a Uint16Array, not in ${a(kind)}`);
-    }
-    halves ??= halfTable();
-    const decoded = new Float32Array(pixels.length);
-    for (let i = 0; i < decoded.length; i++) decoded[i] = halves[pixels[i]];
-    return decoded;
-  }
-  if (FLOATS.includes(kind)) return pixels;
-  if (kind !== "Array") {
-    const half = kind === "Uint16Array" ? ", or halfFloats: true for the bits of half floats" : "";
-    const wanted = `pass linear radiance in a Float32Array${half}`;
-    throw new NoisefloorError("ARGUMENT", `pixels in ${a(kind)} are no radiance: ${wanted}`);
-  }
-  const odd = pixels.findIndex((value) => typeof value !== "number");
-  if (odd < 0) return pixels;
-  throw new NoisefloorError("ARGUMENT", `pixels hold numbers, and element ${odd} is ${a(typeof pixels[odd])}`);
-}
-
-const a = (noun) => `${/^[aeiou]/i.test(noun) && !noun.startsWith("Ui") ? "an" : "a"} ${noun}`;
-
 // Sessions
 
 /**
@@ -554,7 +515,9 @@ export class Session {
    * Takes tiles out of the caller's pixels, the way C reads them: rows from the top, three floats a pixel.
    */
   #push(name, given, spp, { tile, channels, stride, fromBottom = false, halfFloats = false }) {
-    const pixels = radiance(given, halfFloats);
+    const wrong = whyNoRadiance(given, halfFloats);
+    if (wrong) throw new NoisefloorError("ARGUMENT", wrong);
+    const pixels = halfFloats ? decoded(given) : given;
     const source =
       tile === undefined ? { x: 0, y: 0, width: this.width, height: this.height } : this.#tile(tile);
     const [got, needed] = [pixels.length, source.width * source.height];

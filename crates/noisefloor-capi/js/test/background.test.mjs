@@ -101,6 +101,41 @@ test("whoever asks renders nothing beyond the limit", async () => {
   session.close();
 });
 
+test("half floats are read in the worker, and integers are refused", async () => {
+  // Halves of 0.25 to 0.5, whose steps are 1/4096
+  const bits = (seed) => {
+    const random = noise(seed);
+    return Uint16Array.from({ length: 3 * width * height }, () => 0x3400 + Math.floor(512 + 500 * random()));
+  };
+  const value = (bit) => 0.25 + (bit - 0x3400) / 4096;
+  for (const whenFull of ["wait", "merge"]) {
+    const session = await BackgroundSession.open(width, height, { tile: 32, whenFull, linear: true });
+    const pushed = [];
+    for (let k = 0; k < 6; k++) {
+      const pixels = session.buffer(3 * width * height, Uint16Array);
+      pixels.set(bits(k + 1));
+      const pass = session.push(pixels, { spp: 4, halfFloats: true });
+      if (whenFull === "wait") assert.equal(pixels.length, 0, "handed over without a copy");
+      await pass;
+      pushed.push(bits(k + 1));
+    }
+    await session.finish();
+    const image = await session.image();
+    image.forEach((found, i) => {
+      const mean = pushed.reduce((sum, pass) => sum + value(pass[i]), 0) / pushed.length;
+      assert.ok(Math.abs(found - mean) < 1e-6);
+    });
+    for (const wrong of [new Uint8Array(3 * width * height), new Uint16Array(3 * width * height), "grey"]) {
+      await assert.rejects(session.push(wrong, { spp: 4 }), { code: "ARGUMENT" });
+      await assert.rejects(session.pushRunning(wrong, { spp: 4 }), { code: "ARGUMENT" });
+    }
+    const floats = new Float32Array(3 * width * height);
+    await assert.rejects(session.push(floats, { spp: 4, halfFloats: true }), { code: "ARGUMENT" });
+    assert.equal(session.pending, 0);
+    session.close();
+  }
+});
+
 test("what is wrong comes as an error of a later call", async () => {
   const session = await BackgroundSession.open(width, height, { tile: 32 });
   session.push(new Float32Array(3 * width * height).fill(NaN), { spp: 4 }).catch(() => {});
