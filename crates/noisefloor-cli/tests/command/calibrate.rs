@@ -51,20 +51,19 @@ fn renders_stop_for_the_eyes_that_are_kept() {
     keep(&own, "me", 2.0, &digest);
     let render = |name: &str, more: &[&str]| {
         let out = home.path().join(name);
-        let typed = [&tiny(text(&out), more)[..], &["--max-spp", "4000"]].concat();
-        let typed: Vec<&str> = typed.into_iter().collect();
-        let output = command(&typed).env("XDG_CONFIG_HOME", home.path()).output().unwrap();
+        let output = command(&tiny(text(&out), more)).env("XDG_CONFIG_HOME", home.path()).output().unwrap();
         assert!(output.status.success(), "{}", stderr(&output));
         (json(&out.join("report.json")), stderr(&output), column(&out.join("stops.csv"), "spp"))
     };
     let spp = |stops: &[String]| stops.iter().map(|spp| spp.parse::<f64>().unwrap()).sum::<f64>();
-    let (report, said, mine) = render("mine", &[]);
+    let whole = ["--max-spp", "4000"];
+    let (report, said, mine) = render("mine", &whole);
     assert!(
         said.contains("for the eyes of me (2.00 times") && said.contains("38 pixels per degree"),
         "{said}"
     );
     assert_eq!(report["params"]["audience"]["slope"], 2.0, "{report:#}");
-    let (_, said, theirs) = render("theirs", &["--eyes", "none"]);
+    let (_, said, theirs) = render("theirs", &[&whole[..], &["--eyes", "none"]].concat());
     assert!(!said.contains("eyes of me"), "{said}");
     assert!(spp(&mine) > 1.3 * spp(&theirs), "{mine:?} {theirs:?}");
     let (_, said, _) = render("typed", &["--audience", "1,0"]);
