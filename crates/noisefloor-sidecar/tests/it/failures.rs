@@ -34,7 +34,7 @@ fn a_process_that_fails_again_and_again_is_an_error() {
         ("give too many", "4 samples where 1 were requested"),
         ("stop much too late", "100001 samples where 1 were requested"),
     ];
-    for (how, words) in wrong {
+    let is_wrong = |how: &str, words: &str| {
         let Some(fake) = Fake::new(how) else { return };
         let (error, source) = failure(&fake);
         let cause = cause(&error);
@@ -43,14 +43,25 @@ fn a_process_that_fails_again_and_again_is_an_error() {
         assert!(said.starts_with("Fake 1, sampling 4 tiles, 0 to 3: its answer is wrong: "), "{how}: {said}");
         assert!(said.contains(words), "{how}: {said}");
         assert!(source.restarts().is_empty());
-    }
-    for how in ["die", "crash", "close standard output", "stop in the middle"] {
+    };
+    let died = |how: &str| {
         let Some(fake) = Fake::new(how) else { return };
         let (error, _) = failure(&fake);
         let cause = cause(&error);
         assert!(matches!(*cause.cause, SidecarCause::Died { .. }), "{how}: {cause:?}");
         assert_eq!(cause.tile, None, "{how}");
+    };
+    // Four at a time: each begins two processes, and mostly waits for them
+    for wrong in wrong.chunks(4) {
+        std::thread::scope(|scope| {
+            wrong.iter().for_each(|(how, words)| drop(scope.spawn(move || is_wrong(how, words))));
+        });
     }
+    std::thread::scope(|scope| {
+        for how in ["die", "crash", "close standard output", "stop in the middle"] {
+            scope.spawn(move || died(how));
+        }
+    });
 }
 
 #[test]
