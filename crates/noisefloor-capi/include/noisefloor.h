@@ -513,7 +513,7 @@ NfStatus nf_background_begin(const NfSession *session,
 
 // Adds a batch to the pass: the mean of spp new samples per pixel of the whole picture, with this many channels per
 // pixel, of which the first three are red, green and blue; floats = channels * width * height. It is copied, also from
-// memory that is mapped for a GPU. Tiles that are done when it is their turn have the samples at the end.
+// memory that is pinned or mapped for a GPU. Tiles that are done when it is their turn have the samples at the end.
 NfStatus nf_background_push_image(const NfBackground *background,
                                   uint64_t spp,
                                   const float *image,

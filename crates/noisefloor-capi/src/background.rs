@@ -131,7 +131,7 @@ pub unsafe extern "C" fn nf_background_begin(
 
 /// Adds a batch to the pass: the mean of spp new samples per pixel of the whole picture, with this many channels per
 /// pixel, of which the first three are red, green and blue; floats = channels * width * height. It is copied, also from
-/// memory that is mapped for a GPU. Tiles that are done when it is their turn have the samples at the end.
+/// memory that is pinned or mapped for a GPU. Tiles that are done when it is their turn have the samples at the end.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_background_push_image(
     background: *const NfBackground,

@@ -135,7 +135,8 @@ impl PyBackground {
         Self::tell(py, py.detach(|| background.finish()).map_err(|error| self.raised(error))?)
     }
 
-    /// Waits until no pass waits, gives the session back, and returns it. What was pushed and not handed over is lost.
+    /// Waits until no pass waits, gives the session back, and returns it. What was pushed and not handed over is lost. From then
+    /// on, calls of other threads raise Error.
     ///
     /// Raises what failed in the background; the session is back then, too, unless an error inside the library was it.
     fn end(&self, py: Python<'_>) -> PyResult<Py<PySession>> {

@@ -329,6 +329,28 @@ class Backgrounds(unittest.TestCase):
             self.assertEqual((background.spp_left, handed, summed), (0, 200, 0))
             self.assertEqual({stop.reason for stop in background.end().stops()}, {"max-spp"})
 
+    def test_it_ends_while_another_thread_hands_over(self):
+        session = nf.Session(96, 80, params=nf.Params(tile=32, max_spp=10**9), linear=True)
+        background = nf.Background(session, waiting=1)
+        raised, begun = [], threading.Event()
+
+        def render():
+            try:
+                for image in self.passes(10**6, spp=1):
+                    background.push_image(1, image)
+                    background.judge()
+                    begun.set()
+            except nf.Error as error:
+                raised.append(str(error))
+
+        renderer = threading.Thread(target=render)
+        renderer.start()
+        self.assertTrue(begun.wait(60))
+        self.assertIs(background.end(), session)
+        renderer.join()
+        self.assertIn("given back", raised[0])
+        self.assertTrue((session.spp() > 0).all())
+
     def test_it_ends_with_its_block(self):
         session = nf.Session(96, 80, params=PARAMS)
         with nf.Background(session, when_full="merge") as background:

@@ -43,7 +43,7 @@ use crate::tile::{Tile, TileGrid, TilePixels};
 use crate::watch::Warning;
 use std::any::Any;
 use std::collections::{HashMap, VecDeque};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
@@ -108,6 +108,8 @@ struct State {
     /// Of the pass that is being judged, what its batches are of and their samples.
     at_work: Option<Vec<(Of, u64)>>,
     ending: bool,
+    /// Whether the session is being given back, so that nothing more is taken.
+    closed: bool,
     /// What the session wanted after the last pass.
     requests: Vec<Request>,
     next_pass: Option<u64>,
@@ -181,7 +183,8 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         spent.unwrap_or_else(|| vec![[0.0; 3]; self.grid.width() * self.grid.height()])
     }
 
-    /// As [`Session::push_image`], later. Tiles that are done by then have the samples at the end.
+    /// As [`Session::push_image`], later. Tiles that are done by then have the samples at the end. What is pushed takes memory
+    /// until it was handed over ([`Background::judge`]) and judged.
     ///
     /// # Errors
     /// [`SessionError::Image`] if its size is not the image's, and what failed in the background.
@@ -222,7 +225,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
 
     fn add(&self, push: Push) -> Result<(), SessionError> {
         let mut state = self.shared.state();
-        state.failed.clone().map_or(Ok(()), Err)?;
+        state.check()?;
         state.pass.push(push);
         Ok(())
     }
@@ -234,10 +237,10 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     pub fn judge(&self) -> Result<(), SessionError> {
         let mut state = self.shared.state();
         if self.when_full == WhenFull::Wait {
-            let full = |state: &mut State| state.failed.is_none() && state.waiting.len() >= self.waiting;
+            let full = |state: &mut State| state.check().is_ok() && state.waiting.len() >= self.waiting;
             state = self.shared.wait_while(state, full);
         }
-        state.failed.clone().map_or(Ok(()), Err)?;
+        state.check()?;
         let pass = std::mem::take(&mut state.pass);
         if state.waiting.len() < self.waiting {
             state.waiting.push_back(pass);
@@ -319,13 +322,17 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
 
     /// Looks at the session as the last pass left it, to save a checkpoint or to show the picture: waits for the
     /// verdict that is being given, and the next one waits for `look`. Samples that came after their tile had
-    /// stopped are not in it.
+    /// stopped are not in it. If `look` panics, the session is as before.
     ///
     /// # Errors
     /// [`SessionError::Background`] if the criterion panicked.
     pub fn look<T>(&self, look: impl FnOnce(&Session<C>) -> T) -> Result<T, SessionError> {
         let judged = self.shared.judged.lock().map_err(|_| self.shared.failure())?;
-        judged.session.as_ref().map(look).ok_or_else(|| self.shared.failure())
+        let session = judged.session.as_ref().ok_or_else(|| self.shared.failure())?;
+        // Nothing is changed by looking, so that a panic in it is none of the session's
+        let looked = catch_unwind(AssertUnwindSafe(|| look(session)));
+        drop(judged);
+        looked.map_or_else(|panic| resume_unwind(panic), Ok)
     }
 
     /// Waits until no pass waits, and gives the session back, with the samples that came after their tile had
@@ -338,7 +345,8 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
         self.take()
     }
 
-    /// As [`Background::into_session`], once: for handles of other languages, which others may hold.
+    /// As [`Background::into_session`], once: for handles of other languages, which others may hold. From then on, nothing more
+    /// is taken from other threads.
     ///
     /// # Errors
     /// As of [`Background::into_session`], and the second time.
@@ -348,11 +356,13 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     }
 
     fn take(&self) -> Result<Session<C>, SessionError> {
+        // A renderer on another thread may hand over pass after pass: no more of them, or this would wait for ever
+        self.shared.state().closed = true;
+        self.shared.changed.notify_all();
         drop(self.finish());
         self.end();
         let mut judged = self.shared.judged.lock().map_err(|_| self.shared.failure())?;
         let (session, late, running) = (judged.session.take(), judged.late.take(), judged.running.take());
-        let gone = || SessionError::Background("the session was given back".into());
         let mut session = session.ok_or_else(gone)?;
         self.shared.state().failed.get_or_insert_with(gone);
         self.shared.changed.notify_all();
@@ -418,7 +428,12 @@ impl<C: StoppingCriterion + Send> Shared<C> {
             self.changed.notify_all();
 
             let mut found = None;
-            let judged = catch_unwind(AssertUnwindSafe(|| run(&mut || found = Some(self.take(&mut pass)))));
+            let judged = catch_unwind(AssertUnwindSafe(|| {
+                // Once, whatever is done with it: samples count once
+                run(&mut || {
+                    found.get_or_insert_with(|| self.take(&mut pass));
+                });
+            }));
             let nothing = || Err(SessionError::Background("its work was not done where it was sent".into()));
             let found = match judged {
                 Ok(()) => found.unwrap_or_else(nothing),
@@ -510,7 +525,20 @@ fn add_late<'a>(
     Ok(())
 }
 
+fn gone() -> SessionError {
+    SessionError::Background("the session was given back".into())
+}
+
 impl State {
+    /// Whether anything more is taken.
+    fn check(&self) -> Result<(), SessionError> {
+        match &self.failed {
+            Some(failed) => Err(failed.clone()),
+            None if self.closed => Err(gone()),
+            None => Ok(()),
+        }
+    }
+
     fn pending(&self) -> usize {
         self.waiting.len() + usize::from(self.at_work.is_some())
     }

@@ -532,3 +532,67 @@ fn one_pass_with_all_samples_is_not_the_end() {
     assert_eq!(background.finish().unwrap().stops.len(), 2);
     assert_eq!((background.next_pass(), background.spp_left()), (None, 0));
 }
+
+/// Who gives the session back while another thread renders gets it, and that thread an error, though a pass waits behind each
+/// verdict.
+#[test]
+#[expect(clippy::disallowed_methods, reason = "the renderer's own thread")]
+fn a_session_is_given_back_while_another_thread_hands_over() {
+    let [handed, judged, ended] = [0, 0, 0].map(|n| Arc::new(AtomicUsize::new(n)));
+    let counts = [&handed, &judged, &ended].map(Arc::clone);
+    let until_one_waits = move || {
+        let [handed, judged, ended] = &counts;
+        let with_next = judged.fetch_add(1, Ordering::AcqRel) + 2;
+        while handed.load(Ordering::Acquire) < with_next && ended.load(Ordering::Acquire) == 0 {
+            thread::yield_now();
+        }
+    };
+    let params = Params::default().with_tile(16).with_schedule(Schedule::Every { step: 16 });
+    let judge = Calls { enough: u64::MAX, call: until_one_waits };
+    let session = Session::new(32, 16, judge, params.with_max_spp(1 << 40)).unwrap();
+    let background = Background::new(session, 1, WhenFull::Wait).unwrap();
+    let mut noise = Noise::new(63);
+    let mut pass = || {
+        let image = (0..512).map(|_| [(0.5 + 0.05 * noise.normal()) as f32; 3]).collect();
+        background.push_image(16, image)?;
+        background.judge()?;
+        handed.fetch_add(1, Ordering::AcqRel);
+        Ok::<(), SessionError>(())
+    };
+    thread::scope(|scope| {
+        let renderer = scope.spawn(|| {
+            let failed = (0..1000).find_map(|_| pass().err());
+            ended.store(1, Ordering::Release);
+            failed
+        });
+        while judged.load(Ordering::Acquire) < 4 && !renderer.is_finished() {
+            thread::yield_now();
+        }
+        let spp = background.take_session().unwrap().film().spp(0);
+        let failed = renderer.join().unwrap().expect("it goes on until it is refused");
+        assert!(failed.to_string().ends_with("the session was given back"), "{failed}");
+        assert_eq!(spp, 16 * handed.load(Ordering::Acquire) as u64);
+    });
+}
+
+/// A panic while the session is looked at is that of who looks.
+#[test]
+fn a_panic_in_a_look_leaves_the_session() {
+    let background = Background::new(of_calls(|| ()), 1, WhenFull::Wait).unwrap();
+    grey(&background).unwrap();
+    let looked = catch_unwind(AssertUnwindSafe(|| background.look(|_| panic!("no disk"))));
+    assert_eq!(said(&*looked.unwrap_err()), "no disk");
+    grey(&background).unwrap();
+    assert_eq!(background.finish().unwrap().judged, 2);
+    assert_eq!(background.into_session().unwrap().film().spp(0), 32);
+}
+
+/// Samples count once, even if an embedder's pool does its work twice.
+#[test]
+fn work_that_is_done_twice_counts_once() {
+    let twice = |work: &mut (dyn FnMut() + Send)| (0..2).for_each(|_| work());
+    let background = Background::new_in(of_calls(|| ()), 1, WhenFull::Wait, twice).unwrap();
+    (0..3).for_each(|_| grey(&background).unwrap());
+    background.finish().unwrap();
+    assert_eq!(background.into_session().unwrap().film().spp(0), 48);
+}
