@@ -11,14 +11,13 @@ use crate::say::note;
 use crate::spell::{JobPath, as_typed, with_frame};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::{
-    ProgressiveSource, Rgb, Schedule, SourceError, Tile, source::Reference, stills::SampleOrigin,
-};
+use noisefloor::{ProgressiveSource, Schedule, SourceError, Tile, source::Reference, stills::SampleOrigin};
 use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
 };
 use noisefloor_scenefile::{LoadError, LoadOptions, Loaded, group_warnings};
+use noisefloor_sidecar::AdaptivePicture;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
@@ -147,7 +146,7 @@ pub trait Source: ProgressiveSource {
         _most: Option<u64>,
         _seed: u32,
         _part: Option<Tile>,
-    ) -> anyhow::Result<Option<Vec<Rgb>>> {
+    ) -> anyhow::Result<Option<AdaptivePicture>> {
         Ok(None)
     }
 

@@ -5,6 +5,8 @@ A scene is a .blend file; scripts inside are not run. Or it is a .py file, which
 The file that is run begins with addon/noisefloor_addon/sampling.py, which says what samples are: see src/lib.rs.
 """
 
+import contextlib
+import math
 import os
 import runpy
 import sys
@@ -152,10 +154,12 @@ class Cycles:
 
     def adaptive(self, threshold, samples, seed, part):
         """The picture, or a part of it, as Cycles renders it by the settings of the scene, until this noise threshold; not denoised. Its pixel
-        filter is sampled, so that the noise of neighbours stays independent."""
+        filter is sampled, so that the noise of neighbours stays independent. With the samples of its pixels, and their limits."""
         cycles, render = self.scene.cycles, self.scene.render
         names = [*self.own, "use_adaptive_sampling", "adaptive_threshold", "seed"]
         before = {name: getattr(cycles, name) for name in names}
+        layer = next(layer for layer in self.scene.view_layers if layer.use)
+        counted = layer.cycles.pass_debug_sample_count
         try:
             for name, value in self.own.items():
                 setattr(cycles, name, value)
@@ -165,38 +169,62 @@ class Cycles:
             cycles.use_adaptive_sampling, cycles.adaptive_threshold, cycles.seed = True, threshold, seed
             if samples:
                 cycles.samples = samples
+            # Of this picture, and of one that is as good as two where samples follow the threshold
+            fewest = [least(cycles.adaptive_min_samples, each, cycles.samples) for each in (threshold, threshold / math.sqrt(2))]
+            limits = cycles.adaptive_min_samples, threshold, cycles.samples
+            layer.cycles.pass_debug_sample_count = True
             size = render.resolution_x, render.resolution_y
             region = tuple(part or (0, 0, *size))
             aim(render, size, region)
             self.shape = (*region[:1:-1], 3)
-            return self.np.ascontiguousarray(self._render(), self.np.float32)
+            with self._composited(layer) as (tree, node, out):
+                colours, together = (tree.nodes.new(f"CompositorNode{name}Color") for name in ("Separate", "Combine"))
+                tree.links.new(node.outputs["Image"], colours.inputs[0])
+                for channel in range(3):
+                    tree.links.new(colours.outputs[channel], together.inputs[channel])
+                # The count takes the place of alpha, so that one file has both
+                tree.links.new(node.outputs["Debug Sample Count"], together.inputs[3])
+                tree.links.new(together.outputs[0], out.inputs[0])
+                picture, shares = self._render(alpha=True)
+            taken = counts(shares.astype(self.np.float32), *limits)
+            taken = self.np.repeat(taken, 3, axis=2)
+            return self.np.ascontiguousarray(picture, self.np.float32), taken, (*fewest, cycles.samples)
         finally:
+            layer.cycles.pass_debug_sample_count = counted
             for name, value in before.items():
                 setattr(cycles, name, value)
 
-    def first_hits(self, index, samples):
-        """Albedo and normals as Cycles gives them to its own denoisers: where a mirror or glass is hit, of what is seen in it."""
-        scene, render, cycles, groups = self.scene, self.scene.render, self.scene.cycles, self.bpy.data.node_groups
-        layer = next(layer for layer in scene.view_layers if layer.use)
-        before = cycles.diffuse_bounces, layer.cycles.denoising_store_passes
-        # Paths need go no further than to the first surface that is no mirror
-        cycles.diffuse_bounces, layer.cycles.denoising_store_passes = 0, True
-        # Only a compositor makes a pass the picture
+    @contextlib.contextmanager
+    def _composited(self, layer):
+        """A compositor, whose output is the picture: its tree, the node of a layer, and the last. Only that makes a pass the picture."""
+        scene, groups = self.scene, self.bpy.data.node_groups
         tree = groups.new("noisefloor", "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
         node, out = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("NodeGroupOutput")
         node.scene, node.layer = scene, layer.name
-        scene.compositing_node_group, render.use_compositing = tree, True
+        scene.compositing_node_group, scene.render.use_compositing = tree, True
+        try:
+            yield tree, node, out
+        finally:
+            scene.compositing_node_group, scene.render.use_compositing = None, False
+            groups.remove(tree)
+
+    def first_hits(self, index, samples):
+        """Albedo and normals as Cycles gives them to its own denoisers: where a mirror or glass is hit, of what is seen in it."""
+        cycles = self.scene.cycles
+        layer = next(layer for layer in self.scene.view_layers if layer.use)
+        before = cycles.diffuse_bounces, layer.cycles.denoising_store_passes
+        # Paths need go no further than to the first surface that is no mirror
+        cycles.diffuse_bounces, layer.cycles.denoising_store_passes = 0, True
         region = (0, 0, self.info["width"], self.info["height"])
         try:
             pictures = []
-            for name in ["Denoising Albedo", "Denoising Normal"]:
-                tree.links.clear()
-                tree.links.new(node.outputs[name], out.inputs[0])
-                pictures.append(self._mean(region, 0, 0, samples, f" first hits {index}"))
+            with self._composited(layer) as (tree, node, out):
+                for name in ["Denoising Albedo", "Denoising Normal"]:
+                    tree.links.clear()
+                    tree.links.new(node.outputs[name], out.inputs[0])
+                    pictures.append(self._mean(region, 0, 0, samples, f" first hits {index}"))
         finally:
-            scene.compositing_node_group, render.use_compositing = None, False
-            groups.remove(tree)
             cycles.diffuse_bounces, layer.cycles.denoising_store_passes = before
         albedo, normal = pictures
         # A lamp's albedo is its radiance
@@ -216,9 +244,10 @@ class Cycles:
             done += length
         return total / samples
 
-    def _render(self):
-        """Mean of the samples chosen, rows from the top, as float64."""
+    def _render(self, alpha=False):
+        """Mean of the samples chosen, rows from the top, as float64; and alpha, if it is wanted."""
         images = self.bpy.data.images
+        self.scene.render.image_settings.color_mode = "RGBA" if alpha else "RGB"
         self.bpy.ops.render.render()
         # The pixels of a render result are out of a script's reach: only a file has them. It is there for milliseconds, because
         # a process whose parent is gone ends at once and cleans nothing up
@@ -230,11 +259,13 @@ class Cycles:
             pixels = self.np.empty(len(image.pixels), self.np.float32)
             image.pixels.foreach_get(pixels)
         width, height = image.size
-        picture = pixels.reshape(height, width, image.channels)[::-1, :, :3]
+        every = pixels.reshape(height, width, image.channels)[::-1]
+        picture = every[..., :3]
         images.remove(image)
         if picture.shape != self.shape:
             raise RuntimeError(f"a region of {self.shape} came back as {picture.shape}")
-        return picture.astype(self.np.float64)
+        picture = picture.astype(self.np.float64)
+        return (picture, every[..., 3:]) if alpha else picture
 
 
 if __name__ == "__main__":

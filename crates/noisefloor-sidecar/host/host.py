@@ -11,7 +11,8 @@ A host script defines a class and hands it to `serve`:
         info = {...}                    # name, width, height, unit, repeats, warnings
         def sample(self, tiles): ...    # [(samples, array of height x width x 3 float32), ...], in the order of the tiles
         def first_hits(self, index, samples): ...   # optional: arrays of the albedo and the normals of the whole image
-        def adaptive(self, threshold, samples, seed, part): ...   # optional: the image, or (x, y, width, height) of it, by the renderer's own sampling
+        def adaptive(self, threshold, samples, seed, part): ...   # optional: the image, or (x, y, width, height) of it, by the renderer's own sampling;
+                                        # or that, the samples of its pixels as another, and (the fewest, those with a threshold finer by the root of two, the most)
 
     host.serve(Renderer)
 
@@ -243,7 +244,12 @@ def _answer(Host, renderer, request, data):
         if image is None:
             return renderer, {"ok": True, "adaptive": False}, []
         size = request["part"][2:] if request["part"] else (renderer.info["width"], renderer.info["height"])
-        return renderer, {"ok": True, "adaptive": True}, [_bytes(image, *size)]
+        image, samples, limits = image if isinstance(image, tuple) else (image, None, None)
+        # A reply has less than 4 GiB
+        if samples is None or 2 * 12 * size[0] * size[1] >= 2**32:
+            return renderer, {"ok": True, "adaptive": True}, [_bytes(image, *size)]
+        counts = [float(limit) for limit in limits]
+        return renderer, {"ok": True, "adaptive": True, "counts": counts}, [_bytes(image, *size), _bytes(samples, *size)]
     if op == "filter":
         width, height, names, count = (request[key] for key in ["width", "height", "pictures", "frames"])
         size = 12 * width * height

@@ -38,7 +38,7 @@
 //! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `late` (optional), `warnings` |
 //! | `sample` | `samples`; payload: the means of the new samples of each tile that has any |
 //! | `first_hits` | `first_hits` (true or false); payload: albedo and normals of the whole image if true |
-//! | `adaptive` | `adaptive` (true or false); payload: the image, or its part, if true |
+//! | `adaptive` | `adaptive` (true or false), `counts` (optional); payload: the image, or its part, if true; with `counts` also the samples of each pixel, as another image |
 //! | `filter` | payload: one picture |
 //! | `quit` | the process ends after its reply |
 //!
@@ -50,7 +50,8 @@
 //! `init` says how many samples, over all pixels of a tile, the renderer takes before it can stop.
 //!
 //! `first_hits` has `index` and `samples`. `adaptive` has `threshold`, `samples` (the most per pixel, or null for
-//! what the scene says) and `seed`: the renderer samples as it likes, until its own noise threshold.
+//! what the scene says) and `seed`: the renderer samples as it likes, until its own noise threshold. `counts` are the fewest samples
+//! of a pixel, those with a threshold finer by √2, and the most.
 //!
 //! A host that filters pictures gets `init` with `protocol`, `threads` and `device` only, and replies with its `name`, and
 //! `warnings` (optional). `filter`
@@ -92,5 +93,5 @@ pub use picture_command::PictureCommand;
 pub use picture_filter::{FilterPlan, PictureFilter};
 pub use renderer::{DEFAULT_TIMEOUT, Device, HostOptions, Job, Renderer};
 pub use setup::{HOST, find, gpus, install, private_folder, probe};
-pub use sidecar::Sidecar;
+pub use sidecar::{AdaptivePicture, Sidecar};
 pub use threshold_command::ThresholdCommand;

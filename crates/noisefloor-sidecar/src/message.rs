@@ -124,8 +124,11 @@ pub(crate) struct Adaptive {
     pub(crate) part: Option<[usize; 4]>,
 }
 
-/// The picture is its payload, if the renderer has such a threshold.
+/// The picture is its payload, if the renderer has such a threshold, and the samples of pixels if it tells them: the fewest, those
+/// with a threshold finer by √2, and the most.
 #[derive(Deserialize)]
 pub(crate) struct Adapted {
     pub(crate) adaptive: bool,
+    #[serde(default)]
+    pub(crate) counts: Option<[f32; 3]>,
 }

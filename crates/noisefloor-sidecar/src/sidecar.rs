@@ -10,6 +10,7 @@ use crate::setup;
 use noisefloor::{
     Batch, ProgressiveSource, Request, Rgb, SourceError, SourceInfo, Tile,
     source::{FirstHits, SourceIdentity},
+    tune::PixelCounts,
     watch::LightCheck,
 };
 use serde::Serialize;
@@ -20,6 +21,16 @@ use std::path::Path;
 const CALL_TILES: usize = 4096;
 /// Most pixels in one call: a reply of 3 GiB, where lengths have 32 bits. An image has no more.
 const CALL_PIXELS: usize = noisefloor::tile::MAX_PIXELS;
+
+/// A picture as a renderer itself has sampled it.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct AdaptivePicture {
+    /// Linear radiance, row-major.
+    pub pixels: Vec<Rgb>,
+    /// The samples of its pixels, if the renderer tells.
+    pub counts: Option<PixelCounts>,
+}
 
 /// A renderer in another process. Dropping it ends the process.
 ///
@@ -91,8 +102,8 @@ impl Sidecar {
         self.process.as_ref().map(Process::id)
     }
 
-    /// A picture as the renderer itself samples it, by its own settings, until its own noise threshold: linear radiance,
-    /// row-major; `None` if this renderer has no such threshold. A `part` of it is as in the whole, or refused. `samples` is the most per pixel; without
+    /// A picture as the renderer itself samples it, by its own settings, until its own noise threshold; `None` if this
+    /// renderer has no such threshold. A `part` of it is as in the whole, or refused. `samples` is the most per pixel; without
     /// it, what the scene says. Pictures of two seeds below 2³¹ are independent.
     ///
     /// # Errors
@@ -103,16 +114,28 @@ impl Sidecar {
         samples: Option<u64>,
         seed: u32,
         part: Option<Tile>,
-    ) -> Result<Option<Vec<Rgb>>, SidecarError> {
+    ) -> Result<Option<AdaptivePicture>, SidecarError> {
         let pixels = part.map_or(self.info.width * self.info.height, |part| part.pixels());
         let part = part.map(|part| [part.x, part.y, part.width, part.height]);
         let request = Adaptive { op: "adaptive", threshold, samples, seed, part };
-        let read = |Reply { header: Adapted { adaptive }, payload }: Reply<Adapted>| {
-            exactly(&payload, if adaptive { pixels } else { 0 })?;
-            Ok(adaptive.then(|| rgb(&payload).collect::<Vec<Rgb>>()))
+        let read = |Reply { header: Adapted { adaptive, counts }, payload }: Reply<Adapted>| {
+            let pictures = match (adaptive, counts) {
+                (false, _) => 0,
+                (true, None) => 1,
+                (true, Some(_)) => 2,
+            };
+            exactly(&payload, pictures * pixels)?;
+            let (picture, samples) = payload.split_at(payload.len() / pictures.max(1));
+            let counts = counts.map(|[fewest, fewest_alone, most]| PixelCounts {
+                samples: rgb(samples).map(|[samples, ..]| samples).collect(),
+                fewest,
+                fewest_alone,
+                most,
+            });
+            Ok(adaptive.then(|| AdaptivePicture { pixels: rgb(picture).collect(), counts }))
         };
         let doing = format!("rendering until a noise threshold of {threshold}");
-        self.call(&doing, &[], &request, pixels, read)
+        self.call(&doing, &[], &request, 2 * pixels, read)
     }
 
     /// One call, repeated in a new process if that may help.

@@ -262,6 +262,38 @@ impl Excess {
     }
 }
 
+/// Less of the noise than this share follows the threshold where it is taken to stand still.
+const FOLLOWS: f64 = 0.12;
+
+/// The samples of the pixels of a picture that a renderer sampled until its noise threshold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PixelCounts {
+    /// Of each pixel, row-major.
+    pub samples: Vec<f32>,
+    /// The fewest that the renderer took.
+    pub fewest: f32,
+    /// The fewest of one picture whose threshold is finer by √2: `fewest` or more; twice as many, where two pictures share them.
+    pub fewest_alone: f32,
+    /// The most.
+    pub most: f32,
+}
+
+impl PixelCounts {
+    /// By how much the variance of one picture whose threshold is finer by √2 is larger than that of the mean of two, at a
+    /// pixel with these samples in both; and whether the samples follow the threshold there.
+    fn alone(counts: [&Self; 2], pixel: usize) -> (f64, bool) {
+        let samples = counts.map(|counts| counts.samples.get(pixel).copied().unwrap_or(counts.most));
+        let each = || samples.iter().zip(counts);
+        if each().any(|(&samples, counts)| samples > counts.fewest && samples < counts.most) {
+            return (1.0, true);
+        }
+        let all_of_both = each().all(|(&samples, counts)| samples >= counts.most);
+        let [one, _] = counts;
+        let shared = f64::from(one.fewest) / f64::from(one.fewest_alone);
+        (if all_of_both { 2.0 } else { 2.0 * shared }, false)
+    }
+}
+
 /// Edge of the squares that a picture is looked at in, in pixels: at a desk, 1.7°.
 const SQUARE: usize = 64;
 
@@ -396,6 +428,39 @@ impl PicturePair {
         let ratio = ratio.max((doubted / film.spp(0) as f64).sqrt());
         let place = worst.map(|worst| (worst % self.size().0, worst / self.size().0));
         Ok((self.tell_apart(Excess { place, ..Excess::new(ratio) }), map))
+    }
+
+    /// An excess of these pictures with what is known of *one* whose threshold is finer by √2 ([`Excess::alone`],
+    /// [`Excess::still`]), by the samples that their pixels have. `squares` are those of the picture, with what is wrong in each.
+    ///
+    /// Where pixels have more than the fewest samples and less than the most, their noise follows the threshold, and that
+    /// picture is as good as the mean of both. What is worst in it need not be worst in the mean.
+    pub fn known(&self, excess: Excess, squares: &[(Tile, f64)], counts: [&PixelCounts; 2]) -> Excess {
+        let grey = |[r, g, b]: Rgb| (f64::from(r) + f64::from(g) + f64::from(b)) / 3.0;
+        let [one, other] = self.halves();
+        let mean = self.mean().iter().map(|&pixel| grey(pixel)).sum::<f64>() / self.mean().len() as f64;
+        // Noise as a share of the light: what is seen on the screen is near to that
+        let strength = |pixel: usize| {
+            let light = (grey(one[pixel]) + grey(other[pixel])) / 2.0;
+            ((grey(one[pixel]) - grey(other[pixel])) / (light + mean + 1e-9)).powi(2)
+        };
+        let of_square = |(square, ratio): &(Tile, f64)| {
+            let (mut all, mut larger, mut follows) = (0.0, 0.0, 0.0);
+            for pixel in square.rows(self.size().0).flatten() {
+                let (strength, (times, is_led)) = (strength(pixel), PixelCounts::alone(counts, pixel));
+                (all, larger) = (all + strength, larger + strength * times);
+                follows += if is_led { strength } else { 0.0 };
+            }
+            // Of a picture without any noise, nothing is known
+            let (larger, follows) = if all > 0.0 { (larger / all, follows / all) } else { (2.0, 0.0) };
+            (ratio * larger.sqrt(), follows < FOLLOWS)
+        };
+        let all: Vec<(f64, bool)> = squares.par_iter().map(of_square).collect();
+        let worst = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        match worst {
+            Some((alone, still)) => excess.with_alone(Some(alone)).with_still(still),
+            None => excess,
+        }
     }
 
     /// An excess of these pictures, with what tells them from those of other settings: [`Excess::pictures`].
@@ -694,6 +759,40 @@ mod tests {
             }
         }
         panic!("no end after {:?}", tuning.steps);
+    }
+
+    /// Noise in one half of a picture, none in the other; the fewest samples, the most, or some in between.
+    #[test]
+    fn what_one_picture_leaves_follows_from_the_samples_of_its_pixels() {
+        let size = (128, 64);
+        let picture = |seed: u64| -> Vec<Rgb> {
+            let mut noise = Noise::keyed(&[31, seed]);
+            let of = |i: usize| if i % size.0 < 64 { 1.0 } else { 1e-4 };
+            (0..size.0 * size.1).map(|i| [1.0 + of(i) * 0.1 * noise.normal() as f32; 3]).collect()
+        };
+        let pair = PicturePair::new(size, [picture(1), picture(2)], 32.0).unwrap();
+        let square = |x| Tile { index: 0, x, y: 0, width: 64, height: 64 };
+        let found = |left: f32, right: f32, fewest_alone: f32, ratios: [f64; 2]| {
+            let samples = (0..size.0 * size.1).map(|i| if i % size.0 < 64 { left } else { right }).collect();
+            let counts = PixelCounts { samples, fewest: 32.0, fewest_alone, most: 256.0 };
+            let squares = [(square(0), ratios[0]), (square(64), ratios[1])];
+            let told = pair.known(Excess::new(ratios[0].max(ratios[1])), &squares, [&counts; 2]);
+            (told.alone.unwrap(), told.still)
+        };
+        let near = |(alone, still): (f64, bool), right: f64, stands: bool| {
+            assert!((alone / right - 1.0).abs() < 1e-6 && still == stands, "{alone} {right} {still}");
+        };
+        // As good as both where samples follow, or where two share the fewest; √2 times where one has as many as each
+        near(found(100.0, 100.0, 64.0, [2.0, 1.0]), 2.0, false);
+        near(found(32.0, 32.0, 64.0, [2.0, 1.0]), 2.0, true);
+        near(found(32.0, 32.0, 32.0, [2.0, 1.0]), 2.0 * SQRT_2, true);
+        near(found(256.0, 100.0, 64.0, [2.0, 1.0]), 2.0 * SQRT_2, true);
+        // The worst of one picture is elsewhere than that of the mean
+        near(found(100.0, 256.0, 64.0, [2.0, 1.6]), 1.6 * SQRT_2, true);
+        // Of one picture that is stopped early nothing but its own is known
+        let nothing = PixelCounts { samples: Vec::new(), fewest: 32.0, fewest_alone: 64.0, most: 256.0 };
+        let told = pair.known(Excess::new(2.0), &[(square(0), 2.0)], [&nothing; 2]);
+        assert_eq!(told.alone.map(|alone| (alone / SQRT_2 * 1e6).round()), Some(2e6));
     }
 
     /// Of a renderer whose samples follow its threshold.

@@ -165,7 +165,8 @@ fn adapts(mut source: Sidecar, repeats: bool) {
     };
     let sample = |source: &mut Sidecar| source.sample(&[Request::new(whole, 0, 64)]).unwrap().remove(0).mean;
     let before = sample(&mut source);
-    let mut adaptive = |threshold, seed| source.adaptive(threshold, Some(4096), seed, None).unwrap().unwrap();
+    let mut adaptive =
+        |threshold, seed| source.adaptive(threshold, Some(4096), seed, None).unwrap().unwrap().pixels;
     let [coarse, fine] = [0.4, 0.04].map(|threshold| [1, 2].map(|seed| adaptive(threshold, seed)));
     assert!(apart(&coarse[0], &coarse[1]) > 0.0);
     let (much, little) = (apart(&coarse[0], &coarse[1]), apart(&fine[0], &fine[1]));
@@ -184,6 +185,18 @@ fn cycles_samples_by_its_own_threshold() {
         // A part is as in the whole, but for where Cycles looks at neighbours before it stops
         let mut source = cycles(64, 64).unwrap();
         let mut adaptive = |part| source.adaptive(0.1, Some(256), 3, part).unwrap().unwrap();
+        // The fewest are as Cycles chooses them: 16 over the threshold to the power of 0.3, in whole steps of 16
+        let counts = adaptive(None).counts.unwrap();
+        assert_eq!([counts.fewest, counts.fewest_alone, counts.most], [48.0, 48.0, 256.0]);
+        let [fewest, most] =
+            [f32::min, f32::max].map(|of| counts.samples.iter().copied().reduce(of).unwrap());
+        assert!(
+            fewest == counts.fewest && fewest < most && most <= 256.0,
+            "{fewest} {most} {}",
+            counts.fewest
+        );
+        assert!(counts.samples.iter().all(|samples| samples % 16.0 == 0.0));
+        let mut adaptive = |part| adaptive(part).pixels;
         let part = Tile { index: 0, x: 8, y: 24, width: 40, height: 32 };
         let (whole, cut) = (adaptive(None), adaptive(Some(part)));
         let whole: Vec<Rgb> = part.rows(64).flatten().map(|pixel| whole[pixel]).collect();

@@ -2,9 +2,11 @@
 
 use super::{Opened, Resources, Source, SourceJob, stem};
 use anyhow::Context;
-use noisefloor::{Rgb, Schedule, Tile};
+use noisefloor::{Schedule, Tile};
 use noisefloor_luxcore::{Engine, Sampler};
-use noisefloor_sidecar::{CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError};
+use noisefloor_sidecar::{
+    AdaptivePicture, CommandOptions, CommandSource, Job, Renderer, Sidecar, SidecarError,
+};
 use std::fmt;
 use std::str::FromStr;
 
@@ -111,7 +113,7 @@ impl Source for Sidecar {
         most: Option<u64>,
         seed: u32,
         part: Option<Tile>,
-    ) -> anyhow::Result<Option<Vec<Rgb>>> {
+    ) -> anyhow::Result<Option<AdaptivePicture>> {
         Ok(Sidecar::adaptive(self, threshold, most, seed, part)?)
     }
 

@@ -292,7 +292,7 @@ def deliver():
                 bpy.data.images.remove(image)
             image = bpy.data.images.new(name, width, height)
         pixels = numpy.ones((height, width, 4), numpy.float32)
-        numpy.multiply(picture[::-1], numpy.float32(1 / 255), out=pixels[..., :3], dtype=numpy.float32)
+        pixels[..., :3] = picture[::-1] / numpy.float32(255)
         image.pixels.foreach_set(pixels.ravel())
         image.update()
 

@@ -190,11 +190,15 @@ class Fake:
             os._exit(0)
 
     def adaptive(self, threshold, samples, seed, part):
-        if self.options.get("how") != "sample adaptively":
+        if self.options.get("how") not in ("sample adaptively", "count samples"):
             return None
         value = [threshold, float(samples or 0), float(seed)]
         _, _, width, height = part or (0, 0, self.info["width"], self.info["height"])
-        return array.array("f", value * (width * height))
+        picture = array.array("f", value * (width * height))
+        if self.options["how"] == "sample adaptively":
+            return picture
+        counts = array.array("f", (number for pixel in range(width * height) for number in [32 + pixel] * 3))
+        return picture, counts, (32, 64, samples)
 
 
 host.serve(Fake)

@@ -1,4 +1,5 @@
 use crate::kit::{Fake, SIZE, expected, requests, tiles};
+use noisefloor::tune::PixelCounts;
 use noisefloor::{ProgressiveSource, Repeats, Request, Tile, Unit};
 use std::num::NonZeroUsize;
 
@@ -49,13 +50,20 @@ fn what_is_asked_for_reaches_the_renderer() {
 #[test]
 fn an_adaptive_picture_comes_whole() {
     let Some(fake) = Fake::new("sample adaptively") else { return };
-    let picture = fake.open().unwrap().adaptive(0.25, Some(64), 7, None).unwrap();
-    assert_eq!(picture, Some(vec![[0.25, 64.0, 7.0]; SIZE.0 * SIZE.1]));
-    let picture = fake.open().unwrap().adaptive(0.5, None, 0, None).unwrap();
-    assert_eq!(picture, Some(vec![[0.5, 0.0, 0.0]; SIZE.0 * SIZE.1]));
     let part = Tile { index: 0, x: 1, y: 2, width: 3, height: 2 };
-    let picture = fake.open().unwrap().adaptive(0.5, None, 0, Some(part)).unwrap();
-    assert_eq!(picture, Some(vec![[0.5, 0.0, 0.0]; 6]));
+    let adaptive = |threshold, samples, seed, part| {
+        let picture = fake.open().unwrap().adaptive(threshold, samples, seed, part).unwrap().unwrap();
+        assert_eq!(picture.counts, None);
+        picture.pixels
+    };
+    assert_eq!(adaptive(0.25, Some(64), 7, None), vec![[0.25, 64.0, 7.0]; SIZE.0 * SIZE.1]);
+    assert_eq!(adaptive(0.5, None, 0, None), vec![[0.5, 0.0, 0.0]; SIZE.0 * SIZE.1]);
+    assert_eq!(adaptive(0.5, None, 0, Some(part)), vec![[0.5, 0.0, 0.0]; 6]);
+    let Some(fake) = Fake::new("count samples") else { return };
+    let picture = fake.open().unwrap().adaptive(0.25, Some(512), 7, Some(part)).unwrap().unwrap();
+    let samples = (0..6).map(|pixel| 32.0 + pixel as f32).collect();
+    let counts = PixelCounts { samples, fewest: 32.0, fewest_alone: 64.0, most: 512.0 };
+    assert_eq!((picture.pixels, picture.counts), (vec![[0.25, 512.0, 7.0]; 6], Some(counts)));
     let Some(fake) = Fake::new("work") else { return };
     assert_eq!(fake.open().unwrap().adaptive(0.5, None, 0, None).unwrap(), None);
 }

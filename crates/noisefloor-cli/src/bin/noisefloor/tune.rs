@@ -67,6 +67,12 @@ struct Row {
     each: f64,
     /// What is wrong in the worst place, over what may be; null where it cannot be told.
     ratio: Option<f64>,
+    /// The same of one picture whose threshold is finer by √2, and whether that changes next to nothing; where the renderer
+    /// tells how many samples pixels have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    alone: Option<f64>,
+    #[serde(default)]
+    still: bool,
     /// The worst place, and the frame of a sequence that has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     frame: Option<i32>,
@@ -253,6 +259,8 @@ impl Viewer for Tune<'_> {
             setting: look.setting,
             each: look.each,
             ratio: told.ratio.is_finite().then_some(told.ratio),
+            alone: told.alone.filter(|alone| alone.is_finite()),
+            still: told.still,
             frame: self.views[look.view].frame,
             x: judged.excess.place.map(|(x, _)| x),
             y: judged.excess.place.map(|(_, y)| y),
@@ -306,7 +314,8 @@ impl Tune<'_> {
 impl Row {
     fn excess(&self) -> Excess {
         let ratio = self.ratio.unwrap_or(f64::INFINITY);
-        Excess::new(ratio).at(self.x.zip(self.y)).of_pictures(self.pictures)
+        let excess = Excess::new(ratio).at(self.x.zip(self.y)).of_pictures(self.pictures);
+        excess.with_alone(self.alone).with_still(self.still)
     }
 }
 

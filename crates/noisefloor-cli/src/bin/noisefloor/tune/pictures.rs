@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 use noisefloor::display::Display;
 use noisefloor::source::SourceIdentity;
 use noisefloor::stills::{StillError, StillWarning};
-use noisefloor::tune::{Excess, Knob, PicturePair, most_in_squares};
+use noisefloor::tune::{Excess, Knob, PicturePair, PixelCounts, most_in_squares};
 use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
 use noisefloor_cli::options::denoiser::filter_plan;
 use noisefloor_cli::options::tone::Tone;
@@ -43,13 +43,20 @@ pub struct Pair {
     pictures: [Vec<Rgb>; 2],
     /// Of each, where it is known.
     spp: Option<f64>,
+    /// Of their pixels, where the renderer tells.
+    counts: Option<[PixelCounts; 2]>,
 }
 
 impl Pair {
     /// A part of both.
     pub fn cropped(&self, part: Tile) -> Self {
         let pictures = self.pictures.each_ref().map(|picture| cut(part, self.size.0, picture));
-        Self { size: (part.width, part.height), pictures, spp: self.spp }
+        let counts = self.counts.as_ref().map(|counts| {
+            counts
+                .each_ref()
+                .map(|counts| PixelCounts { samples: cut(part, self.size.0, &counts.samples), ..*counts })
+        });
+        Self { size: (part.width, part.height), pictures, spp: self.spp, counts }
     }
 }
 
@@ -185,9 +192,10 @@ impl Pictures {
                     let picture = source.adaptive(each, *most, seed, part)?;
                     picture.with_context(|| format!("{} has no noise threshold", info.name))
                 };
-                let pictures = [one(seeds[0])?, one(seeds[1])?];
+                let [a, b] = [one(seeds[0])?, one(seeds[1])?];
                 let size = part.map_or((info.width, info.height), |part| (part.width, part.height));
-                Ok(Pair { size, pictures, spp: None })
+                let counts = a.counts.zip(b.counts).map(|(a, b)| [a, b]);
+                Ok(Pair { size, pictures: [a.pixels, b.pixels], spp: None, counts })
             }
             Self::Program { command, most, seeds } => {
                 let picture = |seed| command.render(each, *most, seed, part);
@@ -201,7 +209,12 @@ impl Pictures {
                         b.height
                     );
                 }
-                Ok(Pair { size: (a.width, a.height), pictures: [a.pixels, b.pixels], spp: None })
+                Ok(Pair {
+                    size: (a.width, a.height),
+                    pictures: [a.pixels, b.pixels],
+                    spp: None,
+                    counts: None,
+                })
             }
         }
     }
@@ -259,11 +272,11 @@ fn grow(
         }
     }
     let pictures = whole.map(|picture| cut(part, grid.width(), &picture));
-    Ok(Pair { size: (part.width, part.height), pictures, spp: Some(each as f64) })
+    Ok(Pair { size: (part.width, part.height), pictures, spp: Some(each as f64), counts: None })
 }
 
 /// A part of a picture of this width.
-fn cut(part: Tile, width: usize, picture: &[Rgb]) -> Vec<Rgb> {
+fn cut<T: Copy>(part: Tile, width: usize, picture: &[T]) -> Vec<T> {
     part.rows(width).flatten().map(|pixel| picture[pixel]).collect()
 }
 
@@ -325,7 +338,7 @@ impl<'a> Judges<'a> {
         guides: Option<&Guides>,
         crop: Option<&Crop>,
     ) -> anyhow::Result<Judged> {
-        let Pair { size, pictures, spp } = pair;
+        let Pair { size, pictures, spp, counts } = pair;
         let mut params = self.params.clone();
         if let Some(crop) = crop {
             params.tone_mapping = crop.tone.clone();
@@ -352,6 +365,11 @@ impl<'a> Judges<'a> {
                 self.warned.push(warning);
             }
         }
+        // Of one picture, as far as the samples of pixels tell
+        let known = |excess: Excess, squares: &[(Tile, f64)]| match &counts {
+            Some(counts) => halves.known(excess, squares, counts.each_ref()),
+            None => excess,
+        };
         let display = compared.display().clone();
         let spp = spp.map(|each| 2.0 * each);
         let mean = halves.mean().to_vec();
@@ -376,14 +394,14 @@ impl<'a> Judges<'a> {
                 let film = halves.film(&params)?;
                 let DenoisedExcess { worst, squares, .. } = error.excess(&film, *lost, &params.viewing)?;
                 let map = error.map_of_jods_lost(&VisionModel::new(&params.viewing))?;
-                let excess = in_whole(halves.tell_apart(worst));
+                let excess = known(in_whole(halves.tell_apart(worst)), &squares);
                 let denoised = Some(denoiser.denoise(&guided(&mean, 2))?);
                 Ok(Judged { excess, size, mean, denoised, display, map, squares, spp })
             }
             (TuneCriterion::Noise(oracle), _) => {
                 let (excess, map) = halves.noise(oracle, &params)?;
                 let squares = most_in_squares(size, &map);
-                let excess = in_whole(excess);
+                let excess = known(in_whole(excess), &squares);
                 Ok(Judged { excess, size, mean, denoised: None, display, map, squares, spp })
             }
             (TuneCriterion::Denoised { .. }, None) => bail!("the denoiser was not started"),
