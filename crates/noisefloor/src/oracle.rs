@@ -246,7 +246,11 @@ impl Oracle {
 
     /// What tiles are like now, which are in the order of the grid; `None` for one of which too many pixels have no
     /// evidence.
-    fn look_at(&self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Option<LastDescribed>>, CriterionError> {
+    fn look_at(
+        &self,
+        view: &View<'_>,
+        tiles: &[Tile],
+    ) -> Result<impl Iterator<Item = Option<LastDescribed>> + use<>, CriterionError> {
         let beside = |a: &Tile, b: &Tile| a.y == b.y && a.index + 1 == b.index;
         let runs: Vec<&[Tile]> = tiles.chunk_by(beside).flat_map(|run| run.chunks(SHOWN_TOGETHER)).collect();
         let look_at_run = |run: &&[Tile]| {
@@ -259,7 +263,7 @@ impl Oracle {
         };
         let seen: Vec<Vec<Option<LastDescribed>>> =
             runs.par_iter().map(look_at_run).collect::<Result<_, _>>()?;
-        Ok(seen.into_iter().flatten().collect())
+        Ok(seen.into_iter().flatten())
     }
 
     fn look_at_one(
@@ -568,7 +572,7 @@ impl StoppingCriterion for Oracle {
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
         let tiles: Vec<Tile> = view.film.grid().tiles().collect();
-        let seen = self.look_at(view, &tiles).ok()?;
+        let seen: Vec<Option<LastDescribed>> = self.look_at(view, &tiles).ok()?.collect();
         let Judged { described, .. } = self.judge_seen(view, &seen, &tiles).ok()?;
         let audience = self.audience().then(view.audience);
         let described: Vec<Described> = described.into_iter().flatten().collect();
@@ -589,8 +593,9 @@ impl StoppingCriterion for Oracle {
             let spp = view.film.spp(tile.index) as f64;
             due[tile.index] || self.described[tile.index].as_ref().is_none_or(|d| d.tile.spp != spp)
         };
-        let changed: Vec<Tile> = all.iter().copied().filter(changed).collect();
-        for (tile, seen) in changed.iter().zip(self.look_at(view, &changed)?) {
+        let mut to_describe = all.clone();
+        to_describe.retain(changed);
+        for (tile, seen) in to_describe.iter().zip(self.look_at(view, &to_describe)?) {
             self.described[tile.index] = seen;
         }
 
