@@ -2,7 +2,7 @@
 
 use crate::bands::{Bands, sensitivity, sensitivity_row};
 use crate::csf::{KNOTS, place};
-use crate::lanes::map_rows;
+use crate::lanes::{STRIP, map_rows};
 use crate::masking::{
     BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_rows, transient_row,
 };
@@ -10,7 +10,7 @@ use crate::photometry::{CHANNELS, Photometry, greys, opponent_row};
 use crate::pyramid::{Size, expand_row, reduce};
 use crate::temporal::{ALL_CHANNELS, TRANSIENT, gains};
 use crate::viewing::Viewing;
-use crate::workspace::{STRIP, VisionWorkspace};
+use crate::workspace::VisionWorkspace;
 use multiversion::multiversion;
 use std::ops::Range;
 

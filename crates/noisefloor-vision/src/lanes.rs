@@ -7,6 +7,10 @@
 /// Pixels of a group: as many as the widest vectors hold.
 pub(crate) const LANES: usize = 16;
 
+/// Pixels of the rows that are worked on together, where a row has no more: few enough to stay in the nearest caches.
+/// Each step of the work is a loop, which the processor needs some time to begin and to end.
+pub(crate) const STRIP: usize = 1024;
+
 type Group = [f32; LANES];
 
 /// Makes each pixel of rows of one length from those above it in others, which are at least as long.

@@ -2,12 +2,11 @@
 //! large differences (Mantiuk et al. 2024, §3.5 to §3.6), with the constants of `cvvdp_parameters.json`
 //! 0.5.7.
 
-use crate::lanes::{change_row, map_rows};
+use crate::lanes::{STRIP, change_row, map_rows};
 use crate::math::{exp2, pow};
 use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
 use crate::temporal::{ALL_CHANNELS, TRANSIENT};
-use crate::workspace::STRIP;
 use multiversion::multiversion;
 
 /// Exponent of the difference of contrasts.

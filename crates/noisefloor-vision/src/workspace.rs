@@ -1,5 +1,6 @@
 //! Memory for pictures of a size, used again for the next one.
 
+use crate::lanes::STRIP;
 use crate::masking::{BLUR_RADIUS, MaskScratch};
 use crate::photometry::CHANNELS;
 use crate::pyramid::Size;
@@ -52,10 +53,6 @@ impl Deref for Sizes {
         &self.all[..self.levels]
     }
 }
-
-/// Pixels of the rows that are worked on together, where a row has no more: few enough to stay in the nearest caches.
-/// Each step of the work is a loop, which the processor needs some time to begin and to end.
-pub(crate) const STRIP: usize = 1024;
 
 /// Rows that are worked on together.
 #[derive(Clone, Debug, Default)]
