@@ -32,6 +32,19 @@ pub struct AdaptivePicture {
     pub counts: Option<PixelCounts>,
 }
 
+/// The samples of pixels that a renderer tells, with their limits, if they can be such.
+fn pixel_counts(limits: [f32; 3], payload: &[u8]) -> Result<PixelCounts, Blame> {
+    let samples: Vec<f32> = rgb(payload).map(|[samples, ..]| samples).collect();
+    let [fewest, fewest_alone, most] = limits;
+    let possible = limits.iter().all(|&limit| limit.is_finite() && limit > 0.0)
+        && samples.iter().all(|&samples| samples.is_finite() && samples >= 0.0);
+    if possible {
+        return Ok(PixelCounts { samples, fewest, fewest_alone, most });
+    }
+    let what = format!("sample counts that cannot be, with the limits {limits:?}");
+    Err((None, SidecarCause::Wrong { what }))
+}
+
 /// A renderer in another process. Dropping it ends the process.
 ///
 /// A call that fails because the process ended, did not answer in time, or sent something else than requested
@@ -126,12 +139,7 @@ impl Sidecar {
             };
             exactly(&payload, pictures * pixels)?;
             let (picture, samples) = payload.split_at(payload.len() / pictures.max(1));
-            let counts = counts.map(|[fewest, fewest_alone, most]| PixelCounts {
-                samples: rgb(samples).map(|[samples, ..]| samples).collect(),
-                fewest,
-                fewest_alone,
-                most,
-            });
+            let counts = counts.map(|limits| pixel_counts(limits, samples)).transpose()?;
             Ok(adaptive.then(|| AdaptivePicture { pixels: rgb(picture).collect(), counts }))
         };
         let doing = format!("rendering until a noise threshold of {threshold}");

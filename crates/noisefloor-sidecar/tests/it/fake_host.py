@@ -190,7 +190,7 @@ class Fake:
             os._exit(0)
 
     def adaptive(self, threshold, samples, seed, part):
-        if self.options.get("how") not in ("sample adaptively", "count samples"):
+        if self.options.get("how") not in ("sample adaptively", "count samples", "count to no limit", "count no numbers"):
             return None
         value = [threshold, float(samples or 0), float(seed)]
         _, _, width, height = part or (0, 0, self.info["width"], self.info["height"])
@@ -198,7 +198,9 @@ class Fake:
         if self.options["how"] == "sample adaptively":
             return picture
         counts = array.array("f", (number for pixel in range(width * height) for number in [32 + pixel] * 3))
-        return picture, counts, (32, 64, samples)
+        if self.options["how"] == "count no numbers":
+            counts[0] = float("nan")
+        return picture, counts, (32, 0 if self.options["how"] == "count to no limit" else 64, samples)
 
 
 host.serve(Fake)

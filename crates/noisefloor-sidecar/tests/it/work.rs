@@ -64,6 +64,11 @@ fn an_adaptive_picture_comes_whole() {
     let samples = (0..6).map(|pixel| 32.0 + pixel as f32).collect();
     let counts = PixelCounts { samples, fewest: 32.0, fewest_alone: 64.0, most: 512.0 };
     assert_eq!((picture.pixels, picture.counts), (vec![[0.25, 512.0, 7.0]; 6], Some(counts)));
+    for how in ["count to no limit", "count no numbers"] {
+        let Some(fake) = Fake::new(how) else { return };
+        let error = fake.open().unwrap().adaptive(0.25, Some(512), 7, None).unwrap_err();
+        assert!(error.to_string().contains("sample counts that cannot be"), "{how}: {error}");
+    }
     let Some(fake) = Fake::new("work") else { return };
     assert_eq!(fake.open().unwrap().adaptive(0.5, None, 0, None).unwrap(), None);
 }
