@@ -11,14 +11,11 @@ use std::path::{Path, PathBuf};
 pub enum Earlier {
     /// It is an error that there is any.
     Keep,
-    /// It is overwritten.
     Overwrite,
-    /// It is resumed.
     Resume,
 }
 
 impl Earlier {
-    /// As typed.
     pub fn of(force: bool, resume: bool) -> Self {
         match (force, resume) {
             (true, _) => Self::Overwrite,

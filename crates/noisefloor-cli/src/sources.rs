@@ -69,7 +69,6 @@ pub enum SourceKind {
     Ptwne(PtwneOptions),
     /// A folder of pictures.
     Exr,
-    /// A template.
     Command(String),
     Adapter(#[serde(with = "as_typed")] &'static Adapter),
 }
@@ -298,7 +297,6 @@ impl SourceJob {
         if matches!(self.kind, SourceKind::Ptwne(_)) { 128 } else { 32 }
     }
 
-    /// Opens the source.
     pub fn open(&self, resources: Resources) -> anyhow::Result<Opened> {
         match &self.kind {
             SourceKind::Ptwne(options) => self.open_ptwne(*options),

@@ -21,9 +21,6 @@ enum Kept {
 
 impl JobPath {
     /// The same file from wherever it is read.
-    ///
-    /// # Errors
-    /// If there is no current folder.
     pub fn absolute(&self) -> std::io::Result<Self> {
         std::path::absolute(&self.0).map(Self)
     }
@@ -199,14 +196,10 @@ impl<'de> Deserialize<'de> for JobPath {
 pub mod as_typed {
     use super::*;
 
-    /// # Errors
-    /// Those of the format.
     pub fn serialize<T: Display, S: Serializer>(value: &T, to: S) -> Result<S::Ok, S::Error> {
         to.collect_str(value)
     }
 
-    /// # Errors
-    /// If it is no such text.
     pub fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
         String::deserialize(from)?.parse().map_err(serde::de::Error::custom)
     }

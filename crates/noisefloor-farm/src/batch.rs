@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize, Serializer};
 /// A batch that is asked for.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub struct PlannedBatch {
-    /// The tile.
     pub tile: usize,
     /// Index of its first sample.
     pub first: u64,

@@ -24,10 +24,8 @@ pub enum ShardError {
     /// The operating system could not read it.
     #[error("it cannot be read: {0}")]
     Io(#[from] io::Error),
-    /// Not a shard.
     #[error("it is not a shard: its first bytes are not those of one")]
     Foreign,
-    /// Of another release.
     #[error("it has format version {0}, and this release reads version {VERSION}: render it again")]
     Version(u32),
     /// The content is not what was written.
@@ -36,11 +34,9 @@ pub enum ShardError {
     /// It is of another job.
     #[error("it belongs to another job: its {what} is {kept}, not {now}")]
     Other {
-        /// What differs.
         what: String,
         /// What the shard says of it.
         kept: String,
-        /// What is merged.
         now: String,
     },
     /// Its samples are of another scene, or of other options.
@@ -75,19 +71,13 @@ pub enum FarmError {
     /// A file of the folder cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
     Read {
-        /// The file.
         path: PathBuf,
         /// What the system said.
         source: io::Error,
     },
     /// A file of the folder has another content than it should have.
     #[error("{}: is not what a farm writes: {source}; plan the farm anew in another folder", path.display())]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
+    Json { path: PathBuf, source: serde_json::Error },
     /// A file of the folder cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -97,16 +87,10 @@ pub enum FarmError {
          finish it with the release that planned it, or plan the farm anew in another folder",
         path.display()
     )]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        found: u64,
-    },
+    Version { path: PathBuf, found: u64 },
     /// The folder is not a farm's, or already one.
     #[error("{}: {what}", path.display())]
     Folder {
-        /// The folder.
         path: PathBuf,
         /// What is wrong, and what to do.
         what: String,
@@ -129,14 +113,11 @@ pub enum FarmError {
          it is damaged; plan the farm anew in another folder"
     )]
     Plan {
-        /// The tile.
         tile: usize,
         /// Index of the first sample.
         first: u64,
-        /// Samples per pixel.
         spp: u64,
     },
-    /// The source failed.
     #[error(transparent)]
     Source(#[from] SourceError),
     /// The criterion does not fit, or samples cannot be what they are said to be.
@@ -150,7 +131,6 @@ pub enum FarmError {
     /// A program could not be run, or refused.
     #[error("`{program}` {what}")]
     Program {
-        /// The program.
         program: String,
         /// What it did, and what to do.
         what: String,
@@ -162,15 +142,12 @@ pub enum FarmError {
         path.display(), tasks, step, tasks, step
     )]
     UnderWay {
-        /// The folder.
         path: PathBuf,
-        /// The round.
         number: usize,
         /// Slurm's number of its tasks.
         tasks: String,
         /// Slurm's number of the job that merges them.
         step: String,
-        /// Jobs left.
         left: usize,
     },
     /// Rounds that bring nothing.
@@ -179,9 +156,7 @@ pub enum FarmError {
         path.display(), log.display()
     )]
     Barren {
-        /// The folder.
         path: PathBuf,
-        /// How many.
         rounds: usize,
         /// What the first task of the last one said.
         log: PathBuf,
@@ -196,14 +171,7 @@ pub enum FarmError {
     },
     /// A task whose round is over, or that it never had.
     #[error("{}: round {number} has no task {task} (any more): nothing to do", path.display())]
-    NoTask {
-        /// The folder.
-        path: PathBuf,
-        /// The round.
-        number: usize,
-        /// The task.
-        task: usize,
-    },
+    NoTask { path: PathBuf, number: usize, task: usize },
     /// The folder of a frame has a picture that is not the farm's.
     #[error(
         "{}: holds a picture of another job than the farm's; move it away, or plan the farm in another folder",
@@ -220,31 +188,19 @@ pub enum FarmError {
     Checkpoint(#[from] CheckpointError),
     /// Shards without the render that they are of.
     #[error("{}: does not say which render it is of: {source}; render it again", path.display())]
-    Unknown {
-        /// The shard.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
+    Unknown { path: PathBuf, source: serde_json::Error },
     /// None of the files is a shard.
     #[error("none of these files is a shard; {}: {source}", path.display())]
     NoShard {
-        /// The first file.
         path: PathBuf,
         /// Why it is none.
         source: ShardError,
     },
-    /// Whoever renders failed.
     #[error(transparent)]
     Studio(#[from] StudioError),
     /// Something about one frame.
     #[error("{name}: {source}")]
-    Frame {
-        /// The frame.
-        name: String,
-        /// What.
-        source: Box<Self>,
-    },
+    Frame { name: String, source: Box<Self> },
 }
 
 impl FarmError {

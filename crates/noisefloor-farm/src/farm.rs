@@ -48,7 +48,6 @@ pub struct Order<'a, J> {
 /// What came of an order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Delivery {
-    /// The frame.
     pub frame: String,
     /// Batches in the shard.
     pub batches: usize,
@@ -61,7 +60,6 @@ pub struct Delivery {
 pub struct FarmProgress {
     /// The round under way, or the last one.
     pub round: usize,
-    /// Its tasks.
     pub tasks: usize,
     /// Tasks whose shards are there.
     pub delivered: usize,
@@ -69,7 +67,6 @@ pub struct FarmProgress {
     pub slurm_left: Option<usize>,
     /// Whether every frame is done.
     pub done: bool,
-    /// Each frame.
     pub frames: Vec<FrameProgress>,
     /// Seconds since the round was planned.
     #[serde(skip)]
@@ -79,7 +76,6 @@ pub struct FarmProgress {
 /// How far a frame is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameProgress {
-    /// Its name.
     pub frame: String,
     /// Seconds left, at the pace of the last round.
     pub eta_seconds: Option<f64>,
@@ -95,9 +91,6 @@ fn now() -> f64 {
 
 impl<'a, S: Studio> Farm<'a, S> {
     /// Says what is to be rendered in a folder, and opens every scene once.
-    ///
-    /// # Errors
-    /// [`FarmError`] if something was planned here already, or a frame cannot be divided.
     pub fn plan(studio: &'a S, dir: &Path, plan: FarmPlan<S::Job>) -> Result<(), FarmError> {
         let folder = FarmFolder::new(dir);
         if folder.planned::<S::Job>()?.is_some() {
@@ -116,9 +109,6 @@ impl<'a, S: Studio> Farm<'a, S> {
     }
 
     /// The farm of a folder.
-    ///
-    /// # Errors
-    /// [`FarmError`] if there is none.
     pub fn open(studio: &'a S, dir: &Path) -> Result<Self, FarmError> {
         let folder = FarmFolder::new(dir);
         let plan = folder.plan()?;
@@ -126,15 +116,11 @@ impl<'a, S: Studio> Farm<'a, S> {
     }
 
     /// Locks the folder, to plan and to merge.
-    ///
-    /// # Errors
-    /// [`FarmError::Locked`] if another process does.
     pub fn claim(self) -> Result<Coordinator<'a, S>, FarmError> {
         let lock = self.folder.lock()?;
         Ok(Coordinator { farm: self, _lock: lock })
     }
 
-    /// Its folder.
     pub fn folder(&self) -> &FarmFolder {
         &self.folder
     }
@@ -197,9 +183,6 @@ impl<'a, S: Studio> Farm<'a, S> {
     }
 
     /// What a task of the round under way is to do.
-    ///
-    /// # Errors
-    /// [`FarmError::NoTask`] if the round is over or has no such task.
     pub fn order(&self, number: usize, task: usize) -> Result<Order<'_, S::Job>, FarmError> {
         let round = self.folder.round()?;
         let names = self.plan.names();
@@ -218,9 +201,6 @@ impl<'a, S: Studio> Farm<'a, S> {
     }
 
     /// How far it is.
-    ///
-    /// # Errors
-    /// [`FarmError`] if a file of the folder cannot be read.
     pub fn progress(&self) -> Result<FarmProgress, FarmError> {
         let (round, names) = (self.folder.round()?, self.plan.names());
         let is_there = |(index, task): (usize, &Task)| {
@@ -254,9 +234,6 @@ impl<'a, S: Studio> Farm<'a, S> {
 
     /// Looks after rounds on Slurm until all is done, every so often. Jobs can vanish: a node takes the
     /// step with it, or somebody cancels them; they are submitted again.
-    ///
-    /// # Errors
-    /// [`FarmError::Barren`] if rounds bring nothing; [`FarmError`] if Slurm or the folder fails.
     pub fn wait(self, slurm: &Slurm, every: Duration) -> Result<(), FarmError> {
         let mut vanished = 0;
         loop {
@@ -319,9 +296,6 @@ impl<J: Serialize> Order<'_, J> {
 
 impl<S: Studio> Coordinator<'_, S> {
     /// Merges what is there, judges, and plans the next round; it has no tasks if everything is done.
-    ///
-    /// # Errors
-    /// [`FarmError`] if Slurm works on the round, or a frame cannot be merged.
     pub fn next_round(&self) -> Result<Round, FarmError> {
         self.check_idle()?;
         self.advance()
@@ -362,9 +336,6 @@ impl<S: Studio> Coordinator<'_, S> {
     }
 
     /// Merges what is there, and writes the pictures as far as they are; how far each frame is.
-    ///
-    /// # Errors
-    /// [`FarmError`] if a frame cannot be merged.
     pub fn merge(&self) -> Result<Vec<(String, FrameState)>, FarmError> {
         let names = self.farm.plan.names();
         let merge = |(index, name): (usize, String)| {
@@ -392,9 +363,6 @@ impl<S: Studio> Coordinator<'_, S> {
 
     /// Begins rounds that somebody asked for: what was wrong has been mended, and a round that was killed
     /// meanwhile is no sign of the contrary.
-    ///
-    /// # Errors
-    /// [`FarmError::UnderWay`] if Slurm works on the round.
     pub fn begin(&self) -> Result<(), FarmError> {
         self.check_idle()?;
         let round = self.farm.folder.round()?;
@@ -404,9 +372,6 @@ impl<S: Studio> Coordinator<'_, S> {
 
     /// Renders round after round in `processes` at a time of `program`; see [`run_local`]. False if `cancel`
     /// ended it.
-    ///
-    /// # Errors
-    /// [`FarmError::Barren`] if rounds bring nothing; [`FarmError`] if a frame cannot be merged.
     pub fn run_local(
         &self,
         program: &Path,
@@ -436,10 +401,6 @@ impl<S: Studio> Coordinator<'_, S> {
     }
 
     /// Merges, plans, and submits what is planned; false if everything is done.
-    ///
-    /// # Errors
-    /// [`FarmError::Barren`] if rounds bring nothing; [`FarmError`] if a frame cannot be merged or Slurm
-    /// refuses.
     pub fn submit(&self, slurm: &Slurm) -> Result<bool, FarmError> {
         let Farm { folder, studio, .. } = &self.farm;
         let mut round = self.advance()?;
@@ -461,9 +422,6 @@ impl<S: Studio> Coordinator<'_, S> {
     /// What follows a round on Slurm: merge, judge, and submit the next one; false if everything is done.
     /// Waits for a `farm merge` that somebody has typed meanwhile: without this step nothing would go on.
     /// `own` is its Slurm job.
-    ///
-    /// # Errors
-    /// [`FarmError::Superseded`] if another round is under way; else as [`Coordinator::submit`].
     pub fn step<'a>(
         farm: Farm<'a, S>,
         number: usize,

@@ -45,16 +45,12 @@ impl FarmFolder {
         Self(path.into())
     }
 
-    /// The folder.
     pub fn path(&self) -> &Path {
         &self.0
     }
 
     /// Keeps other coordinators out of the folder, on every machine whose file system shares locks. A
     /// coordinator that was killed holds no lock.
-    ///
-    /// # Errors
-    /// [`FarmError::Locked`] if there is one; [`FarmError::Read`] if the folder cannot be made or locked.
     pub fn lock(&self) -> Result<FarmLock, FarmError> {
         let path = self.0.join(LOCK);
         let failed = |source| FarmError::Read { path: path.clone(), source };
@@ -68,9 +64,6 @@ impl FarmFolder {
     }
 
     /// What is rendered; none if nothing was planned here.
-    ///
-    /// # Errors
-    /// [`FarmError`] if it cannot be read; [`FarmError::Version`] if another release planned it.
     pub fn planned<J: DeserializeOwned>(&self) -> Result<Option<FarmPlan<J>>, FarmError> {
         let path = self.0.join("farm.json");
         let Some(plan) = read_json::<Value>(&path)? else { return Ok(None) };
@@ -81,10 +74,6 @@ impl FarmFolder {
         }
     }
 
-    /// What is rendered.
-    ///
-    /// # Errors
-    /// [`FarmError::Folder`] if nothing was planned here; [`FarmError`] if it cannot be read.
     pub fn plan<J: DeserializeOwned>(&self) -> Result<FarmPlan<J>, FarmError> {
         self.planned()?.ok_or_else(|| FarmError::Folder {
             path: self.0.clone(),
@@ -93,25 +82,15 @@ impl FarmFolder {
     }
 
     /// Writes what is rendered.
-    ///
-    /// # Errors
-    /// [`FarmError::Write`].
     pub fn write_plan<J: Serialize>(&self, plan: &FarmPlan<J>) -> Result<(), FarmError> {
         write_json(&self.0.join("farm.json"), plan)
     }
 
     /// The round under way, or the last one; number 0, without tasks, before the first.
-    ///
-    /// # Errors
-    /// [`FarmError`] if it cannot be read.
     pub fn round(&self) -> Result<Round, FarmError> {
         Ok(read_json(&self.0.join("round.json"))?.unwrap_or_default())
     }
 
-    /// Writes the round.
-    ///
-    /// # Errors
-    /// [`FarmError::Write`].
     pub fn write_round(&self, round: &Round) -> Result<(), FarmError> {
         write_json(&self.0.join("round.json"), round)
     }
@@ -122,9 +101,6 @@ impl FarmFolder {
     }
 
     /// What a frame is.
-    ///
-    /// # Errors
-    /// [`FarmError`] if it was not planned, or cannot be read.
     pub fn frame_job(&self, name: &str) -> Result<FrameJob, FarmError> {
         let path = self.frame(name).join("frame.json");
         let what = "is missing: the frame was not planned; plan the farm anew in another folder".into();
@@ -132,9 +108,6 @@ impl FarmFolder {
     }
 
     /// Writes what a frame is, and makes its folders.
-    ///
-    /// # Errors
-    /// [`FarmError`] if they cannot be made or written.
     pub fn write_frame_job(&self, name: &str, job: &FrameJob) -> Result<(), FarmError> {
         let shards = self.frame(name).join("shards");
         fs::create_dir_all(&shards).map_err(|source| FarmError::Read { path: shards, source })?;
@@ -142,9 +115,6 @@ impl FarmFolder {
     }
 
     /// How far a frame is: nowhere, if what is kept of it is of another job than the one planned.
-    ///
-    /// # Errors
-    /// [`FarmError`] if it cannot be read.
     pub fn state(&self, name: &str) -> Result<FrameState, FarmError> {
         let kept: Option<KeptState> = read_json(&self.frame(name).join("state.json"))?;
         let job = self.job_of(name)?;
@@ -152,9 +122,6 @@ impl FarmFolder {
     }
 
     /// Writes how far a frame is.
-    ///
-    /// # Errors
-    /// [`FarmError`] if it cannot be written, or the frame's job cannot be read.
     pub fn write_state(&self, name: &str, state: &FrameState) -> Result<(), FarmError> {
         let kept = KeptState { of: self.job_of(name)?, state: state.clone() };
         write_json(&self.frame(name).join("state.json"), &kept)
@@ -176,9 +143,6 @@ impl FarmFolder {
     }
 
     /// The shards of a frame, in the order of their names.
-    ///
-    /// # Errors
-    /// [`FarmError::Read`].
     pub fn shards(&self, name: &str) -> Result<Vec<PathBuf>, FarmError> {
         let folder = self.frame(name).join("shards");
         let failed = |source| FarmError::Read { path: folder.clone(), source };
@@ -196,9 +160,6 @@ impl FarmFolder {
     }
 
     /// Removes a shard that is used up, or puts it into the folder `merged` of its frame.
-    ///
-    /// # Errors
-    /// [`FarmError::Read`].
     pub fn retire(&self, name: &str, shard: &ShardFile, keep: bool) -> Result<(), FarmError> {
         let failed = |source| FarmError::Read { path: shard.path().to_owned(), source };
         if !keep {
@@ -210,9 +171,6 @@ impl FarmFolder {
     }
 
     /// Puts a shard that cannot be used aside, under the name it returns.
-    ///
-    /// # Errors
-    /// [`FarmError::Read`].
     pub fn set_aside(&self, shard: &Path) -> Result<PathBuf, FarmError> {
         let aside = shard.with_extension("nfs.bad");
         let failed = |source| FarmError::Read { path: shard.to_owned(), source };

@@ -19,7 +19,6 @@ const T: [f64; 10] = [6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
-    /// What is expected.
     pub total: f64,
     /// In nine of ten sequences, it is no less than this…
     pub low: f64,

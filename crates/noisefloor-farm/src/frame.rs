@@ -169,7 +169,6 @@ pub struct MergedShards {
     pub batches: usize,
     /// Shards that could be used.
     pub shards: usize,
-    /// All tiles.
     pub tiles: usize,
     /// First and last sample, exclusive, of what each open tile needs next.
     pub missing: Vec<(usize, u64, u64)>,

@@ -39,6 +39,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![allow(missing_docs, reason = "serves the commands: any release may change what is public here")]
+
 mod batch;
 mod error;
 mod farm;

@@ -14,9 +14,6 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Runs the tasks of a round, `processes` at a time, as `PROGRAM farm task DIR ROUND TASK`; returns those
 /// that failed. Once `cancel` says so or one cannot be started, no more are started. Those that run are
 /// waited for: a terminal's Ctrl-C reaches them as well, and they end with what they have.
-///
-/// # Errors
-/// [`FarmError`] if a process cannot be started or its log cannot be written.
 pub fn run_local(
     program: &Path,
     folder: &FarmFolder,

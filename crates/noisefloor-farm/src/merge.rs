@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 /// Something that is wrong with a shard. What is wrong was not merged.
 #[derive(Debug)]
 pub struct Problem {
-    /// The shard.
     pub path: PathBuf,
     /// What is wrong with it.
     pub what: String,
@@ -32,7 +31,6 @@ pub struct Merged {
     pub batches: usize,
     /// Samples added, over all pixels.
     pub samples: u64,
-    /// Rounds judged.
     pub rounds: usize,
 }
 
@@ -122,9 +120,6 @@ impl ShardSet {
 
     /// Adds the batches that the session asks for, as far as they are there, and judges each round that is
     /// complete: the steps of a [`Driver`](noisefloor::Driver). Repeated, it adds nothing.
-    ///
-    /// # Errors
-    /// [`FarmError::Session`] if the criterion does not fit.
     pub fn merge_into<C: StoppingCriterion>(
         &mut self,
         session: &mut Session<C>,

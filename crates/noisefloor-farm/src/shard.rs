@@ -42,9 +42,6 @@ pub struct ShardJob {
 
 impl ShardJob {
     /// The job of a source and a session that has its size.
-    ///
-    /// # Errors
-    /// [`SourceError`] if the source cannot read what it depends on.
     pub fn new<C: StoppingCriterion>(
         source: &impl ProgressiveSource,
         session: &Session<C>,
@@ -66,10 +63,6 @@ impl ShardJob {
         }
     }
 
-    /// The tiles.
-    ///
-    /// # Errors
-    /// [`ShardError::Tile`] if a size is out of range.
     pub fn grid(&self) -> Result<TileGrid, ShardError> {
         Ok(TileGrid::new(self.width, self.height, self.tile)?)
     }
@@ -80,9 +73,6 @@ impl ShardJob {
     }
 
     /// Checks that `kept` is the same job as this one.
-    ///
-    /// # Errors
-    /// [`ShardError`] that names the first difference.
     pub fn check(&self, kept: &Self) -> Result<(), ShardError> {
         self.source.change_since(&kept.source).map_or(Ok(()), Err)?;
         let size = |job: &Self| format!("{}×{} in tiles of {}", job.width, job.height, job.tile);
@@ -113,7 +103,6 @@ impl ShardJob {
 /// One batch of a shard.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BatchEntry {
-    /// The tile.
     pub tile: usize,
     /// Index of its first sample.
     pub first: u64,
@@ -192,7 +181,6 @@ impl Shard {
         self.pixels.push(mean);
     }
 
-    /// Number of batches.
     pub fn len(&self) -> usize {
         self.header.batches.len()
     }
@@ -203,9 +191,6 @@ impl Shard {
     }
 
     /// Writes the file, which appears complete or not at all.
-    ///
-    /// # Errors
-    /// [`WriteError`] if it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
         write_atomic(path, |to| -> io::Result<()> {
             FORMAT.write_bytes(&serde_json::to_vec(&self.header)?, &mut *to)?;
@@ -235,9 +220,6 @@ pub struct ShardFile {
 impl ShardFile {
     /// Reads the header, and checks that the file is as long as it says. Memory grows with the header that
     /// arrives, not with what the file claims to hold.
-    ///
-    /// # Errors
-    /// [`ShardError`] if it is foreign, damaged, or of another version.
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, ShardError> {
         let path = path.into();
         let file = open_regular(&path)?;
@@ -273,7 +255,6 @@ impl ShardFile {
         Ok(Self { path, header, grid, offsets })
     }
 
-    /// The file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -284,9 +265,6 @@ impl ShardFile {
     }
 
     /// The render that its samples are of, as its maker keeps it.
-    ///
-    /// # Errors
-    /// If it is not known, or is no such value.
     pub fn render<J: DeserializeOwned>(&self) -> Result<J, serde_json::Error> {
         J::deserialize(&self.header.render)
     }
@@ -307,15 +285,11 @@ impl ShardFile {
         self.header.batches.iter().map(samples).sum()
     }
 
-    /// Its batches.
     pub fn batches(&self) -> &[BatchEntry] {
         &self.header.batches
     }
 
     /// The mean of the samples of a batch, row-major over its tile.
-    ///
-    /// # Errors
-    /// [`ShardError`] if it cannot be read or its checksum differs.
     ///
     /// # Panics
     /// If there is no such batch.

@@ -25,9 +25,6 @@ impl Slurm {
     }
 
     /// Submits the tasks of a round as an array, and the step that follows it whatever becomes of them.
-    ///
-    /// # Errors
-    /// [`FarmError::Program`] if there is no `sbatch`, or it refuses.
     pub fn submit(&self, folder: &FarmFolder, round: &Round) -> Result<SlurmJobs, FarmError> {
         let (dir, number) = (folder.path(), round.number);
         let log = |name: &str| format!("--output={}/log/{number:04}-{name}.log", dir.display());
@@ -63,9 +60,6 @@ impl Slurm {
     }
 
     /// Jobs of a round that are waiting or running.
-    ///
-    /// # Errors
-    /// [`FarmError::Program`] if there is no `squeue`, or it fails.
     pub fn left(jobs: &SlurmJobs) -> Result<usize, FarmError> {
         let mut command = Command::new("squeue");
         command.args([

@@ -26,17 +26,14 @@ const MOST_FRAMES: usize = 1_000_000;
 pub struct Frames(Vec<i32>);
 
 impl Frames {
-    /// The first frame.
     pub fn first(&self) -> i32 {
         self.0[0]
     }
 
-    /// The last frame.
     pub fn last(&self) -> i32 {
         self.0[self.0.len() - 1]
     }
 
-    /// All frames.
     pub fn iter(&self) -> impl Iterator<Item = i32> {
         self.0.iter().copied()
     }
@@ -46,7 +43,6 @@ impl Frames {
         self.0.get(index).copied()
     }
 
-    /// How many.
     pub fn count(&self) -> usize {
         self.0.len()
     }
@@ -155,7 +151,6 @@ pub struct FarmPlan<J> {
     pub(crate) version: u64,
     /// The render; that of a frame follows from it ([`Studio::of_frame`](crate::Studio::of_frame)).
     pub job: J,
-    /// Of a sequence.
     pub frames: Option<Frames>,
     /// Most tasks of a round.
     pub tasks: usize,
@@ -212,7 +207,6 @@ pub struct FrameJob {
 /// How far a frame is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameState {
-    /// All tiles.
     pub tiles: usize,
     /// Tiles that are still open.
     pub open: usize,
@@ -236,12 +230,10 @@ pub struct FrameState {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RoundState {
-    /// Nothing yet.
     #[default]
     Planned,
     /// Its tasks were started here, or by Slurm jobs that nobody waits for any more.
     Started,
-    /// Slurm runs it.
     OnSlurm(SlurmJobs),
 }
 
@@ -250,7 +242,6 @@ pub enum RoundState {
 pub struct Round {
     /// Counts from 1.
     pub number: usize,
-    /// One process each.
     pub tasks: Vec<Task>,
     /// Seconds since 1970 when it was planned.
     pub planned: f64,

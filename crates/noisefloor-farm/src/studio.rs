@@ -14,7 +14,6 @@ use std::path::{Path, PathBuf};
 /// A job is a value. The farm writes it into its plan and into shards, and reads it on other machines: it
 /// must hold all that a render is, with absolute paths, and come back as it was.
 pub trait Studio {
-    /// A render.
     type Job: Clone + Serialize + DeserializeOwned;
 
     /// How checkpoints name such a render; see [`Session::checkpoint`].
@@ -25,40 +24,25 @@ pub trait Studio {
 
     /// The job of a frame that has waited for others, which are done: their numbers and folders. By default,
     /// they have changed nothing.
-    ///
-    /// # Errors
-    /// Its own.
     fn after(&self, job: &Self::Job, frame: i32, first: &[(i32, PathBuf)]) -> Result<Self::Job, StudioError> {
         let _ = (frame, first);
         Ok(job.clone())
     }
 
     /// Opens the source of a job.
-    ///
-    /// # Errors
-    /// Its own.
     fn open(&self, job: &Self::Job) -> Result<FrameSource, StudioError>;
 
     /// The session that a render of that size begins with.
-    ///
-    /// # Errors
-    /// Its own.
     fn session(&self, job: &Self::Job, size: (usize, usize)) -> Result<Session, StudioError>;
 
     /// The file that shows that a folder holds a render already, if one does.
     fn occupied(&self, folder: &Path) -> Option<&'static str>;
 
     /// What a folder holds of the job with this [digest](Checkpoint::job_digest).
-    ///
-    /// # Errors
-    /// Its own.
     fn finished(&self, folder: &Path, digest: &str) -> Result<Finished, StudioError>;
 
     /// The files of a render of this job in a folder, which is made if need be; `force` overwrites one that
     /// is there.
-    ///
-    /// # Errors
-    /// Its own.
     fn files(
         &self,
         job: &Self::Job,
@@ -73,7 +57,6 @@ pub trait Studio {
 
 /// A source that is ready to sample.
 pub struct FrameSource {
-    /// The source.
     pub source: Box<dyn ProgressiveSource>,
     /// Name of its scene.
     pub scene: String,
@@ -93,15 +76,9 @@ pub enum Finished {
 /// The files of one render.
 pub trait RenderFiles {
     /// The render under way in the folder; none if there is none. Its history is taken up.
-    ///
-    /// # Errors
-    /// Its own.
     fn checkpoint(&mut self) -> Result<Option<Checkpoint<'static>>, StudioError>;
 
     /// Writes how far the render is, with a checkpoint; and with pictures, if `over` says what time it took.
-    ///
-    /// # Errors
-    /// Its own.
     fn write(
         &mut self,
         session: &Session,
@@ -118,9 +95,7 @@ pub enum News<'a> {
     Round(&'a Round),
     /// Tasks failed, and are planned again.
     Failed {
-        /// How many.
         failed: usize,
-        /// Of how many.
         tasks: usize,
         /// What the first of them said.
         log: PathBuf,

@@ -10,7 +10,6 @@ pub enum PagesError {
     /// The server cannot listen on an address.
     #[error("cannot listen on {address}: {source}; choose another port with --port")]
     Listen {
-        /// The address.
         address: String,
         /// The error of the operating system.
         source: io::Error,
@@ -26,7 +25,6 @@ pub enum PagesError {
     /// A language file is invalid.
     #[error("{}: {what}; docs/studies.md says what a language file holds", path.display())]
     Language {
-        /// The file.
         path: PathBuf,
         /// What is wrong, with the line number if known.
         what: String,

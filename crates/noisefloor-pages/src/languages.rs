@@ -10,13 +10,10 @@ const BUILT_IN: [(&str, &str); 2] =
 /// Longest language file, in bytes.
 const MAX_FILE: u64 = 1 << 18;
 
-/// Direction of writing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Direction {
-    /// Left to right.
     Ltr,
-    /// Right to left.
     Rtl,
 }
 
@@ -26,17 +23,12 @@ pub enum Direction {
 pub struct Language {
     /// Name of the language, in the language.
     pub name: String,
-    /// Direction of writing.
     pub direction: Direction,
-    /// Texts by name.
     pub text: BTreeMap<String, String>,
 }
 
 /// The built-in languages, and those in a folder, by their code. A file `ar.toml` adds the language `ar` or
 /// replaces the built-in one.
-///
-/// # Errors
-/// [`PagesError`] if a file is malformed, or lacks a text that the English one has.
 pub fn read_languages(folder: Option<&Path>) -> Result<BTreeMap<String, Language>, PagesError> {
     let mut languages = BTreeMap::new();
     for (code, text) in BUILT_IN {
@@ -67,10 +59,6 @@ fn read(path: &Path) -> Result<String, PagesError> {
     std::fs::read_to_string(path).map_err(io)
 }
 
-/// Parses one file.
-///
-/// # Errors
-/// [`PagesError::Language`] if it is malformed.
 pub fn parse_language(text: &str, path: &Path) -> Result<Language, PagesError> {
     toml::from_str(text).map_err(|e| PagesError::Language {
         path: path.to_owned(),

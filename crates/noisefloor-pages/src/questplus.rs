@@ -138,7 +138,6 @@ impl QuestPlus {
         self.posterior.iter_mut().for_each(|p| *p /= sum);
     }
 
-    /// Mean scale.
     pub fn scale(&self) -> f64 {
         self.posterior.iter().zip(SCALES.iter().cycle()).map(|(p, scale)| p * scale).sum()
     }
@@ -159,7 +158,6 @@ impl QuestPlus {
 /// values. The prior is flat, so it is also proportional to the likelihood of the answers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
-    /// The first value.
     pub low: f64,
     /// Spacing of the values.
     pub step: f64,
@@ -168,7 +166,6 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// The values.
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.weights.len()).map(|i| self.low + self.step * i as f64)
     }

@@ -85,9 +85,6 @@ impl Conditions {
     }
 
     /// Checks that every number is possible.
-    ///
-    /// # Errors
-    /// What is out of range, as a sentence.
     pub fn check(&self) -> Result<(), String> {
         let within = |name: &str, value: f64, low: f64, high: f64| {
             let fits = (low..=high).contains(&value);

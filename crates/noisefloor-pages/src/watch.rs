@@ -32,13 +32,9 @@ const FILES: [PageFile; 3] = [
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct LiveState {
-    /// What is rendered.
     pub scene: String,
-    /// Who renders it.
     pub source: String,
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     /// Since the render began.
     pub seconds: f64,
@@ -59,11 +55,8 @@ pub struct LiveTile {
     pub x: usize,
     /// Top edge in pixels.
     pub y: usize,
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
-    /// Samples per pixel.
     pub spp: u64,
     /// Probability, 0…1, that nobody sees noise, by the latest verdict.
     pub probability: Option<f32>,

@@ -26,9 +26,7 @@ pub enum FovAxis {
     Vertical,
     /// From the left to the right.
     Horizontal,
-    /// The shorter edge.
     Smaller,
-    /// The longer edge.
     Larger,
     /// From corner to corner.
     Diagonal,
@@ -157,7 +155,6 @@ pub(crate) struct Lens {
     near: Vec3,
 }
 
-/// Where rays begin.
 #[derive(Clone, Copy, Debug)]
 enum Projection {
     Pinhole,

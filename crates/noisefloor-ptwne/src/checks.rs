@@ -76,9 +76,6 @@ pub(crate) fn room<T>(elements: &mut Vec<T>, more: usize) -> Result<(), SceneErr
 }
 
 /// Checks that there is memory for `bytes`, before what cannot say so needs it.
-///
-/// # Errors
-/// [`SceneError::Memory`] if there is not.
 pub fn check_memory(bytes: usize) -> Result<(), SceneError> {
     Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| SceneError::Memory { bytes })
 }

@@ -34,7 +34,6 @@ enum Use {
 /// 2020).
 pub(crate) struct Tracer<'a> {
     scene: &'a Scene,
-    /// Chooses lights.
     pub(crate) guide: Guide<'a>,
     /// The light that samples find, while a guide is learned from them.
     pub(crate) found: Option<Contributions>,

@@ -18,27 +18,19 @@ pub enum SceneError {
     Range {
         /// Which number.
         what: &'static str,
-        /// Its value.
         value: f32,
         /// The range it must lie in, as text.
         range: &'static str,
     },
     /// An index of a mesh points past its last vertex.
     #[error("a mesh with {vertices} vertices has the index {index}")]
-    Index {
-        /// The index.
-        index: u32,
-        /// Number of vertices.
-        vertices: usize,
-    },
+    Index { index: u32, vertices: usize },
     /// The number of normals or texture coordinates differs from that of positions.
     #[error("a mesh with {positions} positions has {found} {what}; give none, or one per position")]
     Lengths {
         /// What there are too many or too few of.
         what: &'static str,
-        /// Number of positions.
         positions: usize,
-        /// Number found.
         found: usize,
     },
     /// An emitter has no area, and thus no power.
@@ -50,9 +42,7 @@ pub enum SceneError {
     /// The number of pixels of an image does not match its size, or is zero or too large.
     #[error("an image of {width}×{height} pixels has {found} values")]
     Image {
-        /// Width in pixels.
         width: usize,
-        /// Height in pixels.
         height: usize,
         /// Number of values found.
         found: usize,
@@ -82,9 +72,7 @@ pub enum SceneError {
     TooLarge {
         /// What there are too many of.
         what: &'static str,
-        /// Number found.
         found: usize,
-        /// The limit.
         limit: usize,
     },
 }
@@ -101,7 +89,6 @@ pub enum RenderError {
     Option {
         /// The option's name.
         name: &'static str,
-        /// Its value.
         value: usize,
         /// The range it must lie in, as text.
         range: &'static str,

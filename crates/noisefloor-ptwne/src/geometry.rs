@@ -4,7 +4,6 @@ use crate::material::CompiledMaterial;
 use crate::math::Vec3;
 use crate::texture::{Coordinates, twice};
 
-/// "None" among indices.
 pub(crate) const NO: u32 = u32::MAX;
 
 /// In [`Group::frame`]: texture coordinates of a disk are its radius and its angle, counted down or up.

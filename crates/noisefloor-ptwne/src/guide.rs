@@ -67,7 +67,6 @@ impl Contributions {
 #[derive(Debug)]
 pub(crate) struct Guide<'a> {
     pub(crate) strata: &'a LightStrata<'a>,
-    /// Cumulative probabilities.
     sums: Vec<f64>,
 }
 
@@ -80,7 +79,6 @@ pub(crate) struct GuidedSample<'a> {
 }
 
 impl<'a> Guide<'a> {
-    /// By power only.
     pub(crate) fn by_power(strata: &'a LightStrata<'a>) -> Self {
         Self::new(strata, strata.by_power.iter().copied())
     }

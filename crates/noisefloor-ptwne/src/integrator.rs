@@ -63,7 +63,6 @@ fn radiance<const OPACITY: bool>(
     Path::<OPACITY> { scene, settings, sampler, stack, seed, prospect }.radiance(ray)
 }
 
-/// One path.
 struct Path<'a, const OPACITY: bool> {
     scene: &'a Scene,
     settings: Settings,
@@ -241,7 +240,6 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         light_sum * scene.deferred_radiance(light, dir)
     }
 
-    /// Lambertian reflection.
     #[inline(always)]
     fn diffuse(
         &mut self,

@@ -205,7 +205,6 @@ struct Sides {
     normal: Vec3,
     front: bool,
     uv: Coordinates,
-    /// Whether it mirrors.
     shiny: bool,
 }
 

@@ -30,6 +30,8 @@
 //! which `scene` is made. Absent on purpose: state between samples, allocation along paths, and any number
 //! that depends on threads.
 
+#![allow(missing_docs, reason = "serves the commands: any release may change what is public here")]
+
 mod accel;
 mod alias;
 mod bsdf;

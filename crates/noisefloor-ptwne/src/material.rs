@@ -23,12 +23,10 @@ use noisefloor::Rgb;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Material {
-    /// Lambertian reflection.
     Diffuse {
         /// Reflectance, 0…1.
         albedo: Texture,
     },
-    /// A perfect mirror.
     Mirror {
         /// Reflectance at all angles, 0…1.
         reflectance: Rgb,
@@ -70,9 +68,7 @@ pub enum Material {
     },
     /// A conductor with a complex index of refraction η + ik per channel, each 0…100.
     Conductor {
-        /// Real part.
         eta: Rgb,
-        /// Imaginary part.
         k: Rgb,
         /// Factor on the reflection, 0…1.
         reflectance: Texture,

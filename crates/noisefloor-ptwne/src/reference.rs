@@ -48,7 +48,6 @@ const LESSONS: u32 = 2;
 /// n samples of a pixel leave about this times n^−¾ of the contrast of an edge through it (measured).
 const EDGE: f32 = 0.25;
 
-/// A reference.
 pub(crate) struct Picture {
     /// Row-major.
     pub(crate) pixels: Vec<Rgb>,

@@ -29,7 +29,6 @@ pub enum Relief {
     },
     /// Heights along the shading normal (Blinn 1978): the mean of the channels.
     Heights {
-        /// The heights.
         map: Texture,
         /// Their unit, in scene units: −10⁶…10⁶.
         scale: f32,

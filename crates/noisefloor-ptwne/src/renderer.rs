@@ -94,7 +94,6 @@ pub struct Ptwne {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SampleCounts {
-    /// All samples.
     pub samples: u64,
     /// Those that were negative or not finite, and were replaced by black.
     pub dropped: u64,
@@ -177,9 +176,6 @@ impl Ptwne {
 
     /// Renders the paper's reference (§4.3): direct light, mirrors and glass, without visible noise. It follows from the seed, and
     /// changes no sample.
-    ///
-    /// # Errors
-    /// [`SourceError::Failed`] if it was cancelled, see [`Ptwne::watch_reference`].
     pub fn reference(&mut self) -> Result<Reference, SourceError> {
         let key = Key::new(self.options.seed);
         let display = self.preview()?;
@@ -217,7 +213,6 @@ impl Ptwne {
         self.reference_noise.as_ref()
     }
 
-    /// The options.
     pub fn options(&self) -> RenderOptions {
         self.options
     }
@@ -371,8 +366,6 @@ impl ProgressiveSource for Ptwne {
         Ok(identity)
     }
 
-    /// # Errors
-    /// [`SourceError::Failed`] if a tile is partly outside the image.
     fn sample(&mut self, requests: &[Request]) -> Result<Vec<Batch>, SourceError> {
         let mut batches = Vec::new();
         self.render(requests, &mut batches)?;

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Sampling {
-    /// Independent samples.
     Independent,
     /// Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling"), two dimensions at
     /// a time, scrambled and shuffled differently for each pixel and each [`Sequence`]. So noise is white over

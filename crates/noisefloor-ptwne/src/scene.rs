@@ -108,7 +108,6 @@ impl Scene {
         })
     }
 
-    /// The scene's name.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -125,7 +124,6 @@ impl Scene {
         self
     }
 
-    /// The camera.
     pub fn camera(&self) -> Camera {
         self.camera
     }
@@ -136,9 +134,6 @@ impl Scene {
     }
 
     /// The same scene seen by another camera.
-    ///
-    /// # Errors
-    /// [`SceneError`] if the camera has no view direction, or a number is out of range.
     pub fn with_camera(mut self, camera: Camera) -> Result<Self, SceneError> {
         camera.check()?;
         self.camera = camera;
@@ -146,9 +141,6 @@ impl Scene {
     }
 
     /// The same scene under a sky, which replaces what surrounds it.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::environment`](crate::SceneBuilder::environment).
     pub fn with_environment(mut self, environment: Environment) -> Result<Self, SceneError> {
         environment.check()?;
         let mut lights = std::mem::take(&mut self.lights.all);

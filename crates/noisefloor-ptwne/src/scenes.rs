@@ -21,7 +21,6 @@ use crate::{Scene, SceneError};
 
 type Make = fn(&str) -> Result<Scene, SceneError>;
 
-/// A built-in scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuiltInScene {
     /// Its name, for [`by_name`].

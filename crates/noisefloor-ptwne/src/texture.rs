@@ -14,11 +14,8 @@ pub const MAX_TEXTURE_PIXELS: usize = 1 << 26;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Texture {
-    /// One colour everywhere.
     Colour(Rgb),
-    /// A checkerboard.
     Checker {
-        /// The two colours.
         colours: [Rgb; 2],
         /// Squares per unit of u and v.
         scale: [f32; 2],
@@ -34,12 +31,10 @@ pub enum Texture {
     },
     /// A mix of two colours by fractal value noise with four octaves.
     Noise {
-        /// The two colours.
         colours: [Rgb; 2],
         /// Cells of the first octave per unit of u and v.
         scale: [f32; 2],
     },
-    /// An image.
     Image(ImageTexture),
     /// The colours of the mesh's corners ([`Mesh::colours`](crate::Mesh::colours)), interpolated, times a
     /// texture if there is one. Of an opacity, their [alphas](crate::Mesh::alphas). Only for the colour and
@@ -51,9 +46,7 @@ pub enum Texture {
 /// An image in memory. It covers the unit square of u and v; v = 0 is the bottom row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageTexture {
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     /// `width`·`height` pixels, row-major from the top left.
     pub pixels: Pixels,
@@ -88,7 +81,6 @@ pub enum Pixels {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Wrap {
-    /// It repeats.
     #[default]
     Repeat,
     /// It repeats, mirrored every other time.

@@ -59,6 +59,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![allow(missing_docs, reason = "serves the commands: any release may change what is public here")]
+
 mod converged;
 mod cycles;
 mod dammertz;

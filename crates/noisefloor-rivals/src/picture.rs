@@ -17,16 +17,7 @@ pub enum MetricError {
     Size(#[from] TileError),
     /// The number of pixels does not match the size.
     #[error("a picture of {width}×{height} pixels needs {expected} values, not {got}")]
-    Pixels {
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-        /// Width × height.
-        expected: usize,
-        /// Pixels given.
-        got: usize,
-    },
+    Pixels { width: usize, height: usize, expected: usize, got: usize },
     /// The pictures have different sizes.
     #[error("pictures of {0:?} and {1:?} pixels (width, height) cannot be compared; use the same size")]
     Differ((usize, usize), (usize, usize)),
@@ -35,11 +26,8 @@ pub enum MetricError {
     Small {
         /// The metric.
         metric: &'static str,
-        /// Smallest edge.
         least: usize,
-        /// Width in pixels.
         width: usize,
-        /// Height in pixels.
         height: usize,
     },
     /// A metric refused the pictures.
@@ -47,7 +35,6 @@ pub enum MetricError {
     Refused {
         /// The metric.
         metric: &'static str,
-        /// Its reason.
         why: String,
     },
     /// A pixel is not finite.
@@ -57,9 +44,7 @@ pub enum MetricError {
     NotFinite {
         /// `"picture"` or `"reference"`.
         picture: &'static str,
-        /// Its column.
         x: usize,
-        /// Its row.
         y: usize,
     },
     /// ColorVideoVDP cannot compare them.
@@ -85,9 +70,6 @@ pub struct DisplayPixels<'a> {
 
 impl<'a> DisplayPixels<'a> {
     /// A picture of `width`×`height` pixels.
-    ///
-    /// # Errors
-    /// [`MetricError`] if the size is out of range or does not match the number of pixels.
     pub fn new(width: usize, height: usize, pixels: &'a [Rgb]) -> Result<Self, MetricError> {
         check_image(width, height)?;
         let expected = width * height;
@@ -97,12 +79,10 @@ impl<'a> DisplayPixels<'a> {
         Ok(Self { width, height, pixels })
     }
 
-    /// Width in pixels.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height in pixels.
     pub fn height(&self) -> usize {
         self.height
     }
@@ -121,9 +101,7 @@ impl<'a> DisplayPixels<'a> {
 /// How visible a difference is at each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DifferenceMap {
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     /// Row-major, `width * height` values, at least one; their meaning is that of the metric.
     pub values: Vec<f32>,
@@ -135,7 +113,6 @@ impl DifferenceMap {
         self.values.iter().map(|&v| f64::from(v)).sum::<f64>() / self.values.len() as f64
     }
 
-    /// The largest value.
     pub fn max(&self) -> f64 {
         self.values.iter().copied().fold(f32::NEG_INFINITY, f32::max).into()
     }

@@ -145,20 +145,15 @@ pub const RIVALS: &[Rival] = &[
 pub enum SpecError {
     /// No criterion of that name.
     #[error("there is no criterion {name:?}; there are {}", known())]
-    Unknown {
-        /// The name given.
-        name: String,
-    },
+    Unknown { name: String },
     /// Not a number, or one that the criterion cannot take.
     #[error("{spec:?}: {name} takes {wanted}, as in {name}:{example}")]
     Number {
-        /// The spec.
         spec: String,
         /// The criterion.
         name: &'static str,
         /// What it takes.
         wanted: &'static str,
-        /// Its default.
         example: String,
     },
 }
@@ -241,9 +236,6 @@ impl<'de> Deserialize<'de> for RivalSpec {
 }
 
 /// The criterion of a [`RivalSpec`].
-///
-/// # Errors
-/// [`SpecError`] if the name is unknown or the criterion does not accept the number.
 pub fn parse(spec: &str) -> Result<Box<dyn StoppingCriterion + Send>, SpecError> {
     Ok(spec.parse::<RivalSpec>()?.criterion())
 }

@@ -87,24 +87,17 @@ pub(crate) struct Response {
 
 impl Vdp {
     /// A predictor for a viewing condition.
-    ///
-    /// # Errors
-    /// [`VdpViewingError`] if a value of the condition is out of range.
     pub fn new(viewing: VdpViewing) -> Result<Self, VdpViewingError> {
         viewing.check()?;
         Ok(Self { viewing, cortex: Arc::default() })
     }
 
-    /// The viewing condition.
     pub fn viewing(&self) -> &VdpViewing {
         &self.viewing
     }
 
     /// The probability, in [0, 1], that an observer sees a difference at each pixel of two pictures.
     /// Symmetric.
-    ///
-    /// # Errors
-    /// [`MetricError::Differ`] if the pictures have different sizes.
     pub fn visible(
         &self,
         a: &DisplayPixels<'_>,

@@ -17,7 +17,6 @@ use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Satisfied at once.
 struct Hasty {
     halves: bool,
 }

@@ -34,9 +34,6 @@ pub(crate) struct Bounds {
 impl Bounds {
     /// Begins what has the number `key`, is `called` so and may hold others. [`Self::end`] ends it, unless
     /// this is an error.
-    ///
-    /// # Errors
-    /// [`LoadError`] if it holds itself, or if too many are open.
     pub(crate) fn begin(
         &self,
         key: usize,
@@ -58,9 +55,6 @@ impl Bounds {
     }
 
     /// Counts the tables of a material under a coat, which equal coats share.
-    ///
-    /// # Errors
-    /// As [`Self::spend`].
     pub(crate) fn coat(
         &self,
         material: &Material,
@@ -75,10 +69,6 @@ impl Bounds {
         }
     }
 
-    /// Counts work.
-    ///
-    /// # Errors
-    /// [`LoadError::TooLarge`] if it is too much.
     pub(crate) fn spend(&self, work: usize, place: &Place) -> Result<(), LoadError> {
         self.spent.set(self.spent.get().saturating_add(work as u64));
         place.clone().at_most("steps of reading the scene so far", self.spent.get(), MAX_WORK)

@@ -23,7 +23,6 @@ pub(crate) enum Quantity {
     /// A factor on light, such as a reflectance: seen under D65, the white of Rec.709, so that 1 at all
     /// wavelengths is white.
     Factor,
-    /// Emitted light.
     Light,
 }
 

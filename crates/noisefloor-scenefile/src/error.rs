@@ -9,14 +9,12 @@ use std::path::{Path, PathBuf};
 /// Where in a file something is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// The file.
     pub path: PathBuf,
     /// What part of it: a line (`line 12`), or the name of an element (`mesh 3 "Table", primitive 0`).
     pub part: Option<String>,
 }
 
 impl Place {
-    /// A whole file.
     pub(crate) fn file(path: &Path) -> Self {
         Self { path: path.to_owned(), part: None }
     }
@@ -69,7 +67,6 @@ pub enum Treatment {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Warning {
-    /// Where.
     pub place: Place,
     /// Whether it is left out or replaced.
     pub treatment: Treatment,
@@ -101,7 +98,6 @@ impl fmt::Display for Warning {
 pub struct Finding {
     /// What becomes of it.
     pub treatment: Treatment,
-    /// What it is.
     pub what: String,
     /// Where it is, in the order of the file.
     pub places: Vec<Place>,
@@ -154,23 +150,18 @@ fn group(all: impl Iterator<Item = (Treatment, String, Option<Place>)>) -> Vec<F
 pub enum LoadError {
     /// The extension is not one of a scene file.
     #[error("{} is not a scene file: its name must end in .gltf, .glb, .pbrt or .xml", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-    },
+    Format { path: PathBuf },
     /// A file cannot be opened or read.
     #[error("{place} cannot be read")]
     Read {
         /// The file, or where it is named.
         place: Place,
-        /// Why.
         #[source]
         cause: std::io::Error,
     },
     /// A file is not what it should be.
     #[error("{place}: {what}")]
     Bad {
-        /// Where.
         place: Place,
         /// What is wrong, and what is expected.
         what: String,
@@ -178,7 +169,6 @@ pub enum LoadError {
     /// A file asks for something that is not supported and cannot be left out.
     #[error("{place}: {what} is not supported")]
     Unsupported {
-        /// Where.
         place: Place,
         /// What it asks for.
         what: String,
@@ -188,27 +178,22 @@ pub enum LoadError {
     Outside {
         /// Where it is named.
         place: Place,
-        /// The name.
         name: String,
     },
     /// Something is larger than the limit.
     #[error("{place}: {found} {what}, more than {limit}")]
     TooLarge {
-        /// Where.
         place: Place,
         /// What there is too much of.
         what: &'static str,
         /// How much there is.
         found: u64,
-        /// The limit.
         limit: u64,
     },
     /// The renderer does not take a part of the scene.
     #[error("{place}")]
     Scene {
-        /// Where.
         place: Place,
-        /// Why.
         #[source]
         cause: SceneError,
     },
@@ -275,9 +260,6 @@ const MAX_ERRORS: usize = 1000;
 
 impl Errors {
     /// Keeps the error, if it is one, and continues.
-    ///
-    /// # Errors
-    /// All errors so far if something was too large, or if they are too many.
     pub(crate) fn take<T>(&mut self, result: Result<T, LoadError>) -> Result<Option<T>, LoadError> {
         match result {
             Ok(value) => Ok(Some(value)),
@@ -293,9 +275,6 @@ impl Errors {
     }
 
     /// Whether all went well.
-    ///
-    /// # Errors
-    /// What was collected.
     pub(crate) fn finish(self) -> Result<(), LoadError> {
         if self.errors.is_empty() { Ok(()) } else { Err(self.into_error()) }
     }

@@ -75,9 +75,6 @@ impl Folder {
     }
 
     /// Adds a folder, relative to the scene's own, in which to look for files.
-    ///
-    /// # Errors
-    /// As [`Self::find`].
     pub(crate) fn search(&mut self, name: &str, place: &Place) -> Result<(), LoadError> {
         place.clone().at_most("search paths", self.searched.len() as u64, MAX_FOLDERS)?;
         let path = self.find(name, place)?;
@@ -143,9 +140,6 @@ impl Folder {
     }
 
     /// Counts bytes that compressed data becomes, before it does.
-    ///
-    /// # Errors
-    /// [`LoadError::TooLarge`] if all together are out of proportion to the files.
     pub(crate) fn inflate(&self, bytes: u64, place: &Place) -> Result<(), LoadError> {
         self.inflated.set(self.inflated.get().saturating_add(bytes));
         place.clone().at_most("inflated bytes so far", self.inflated.get(), self.most_inflated())
@@ -161,9 +155,6 @@ impl Folder {
     }
 
     /// Counts pixels of a picture, before they are decoded.
-    ///
-    /// # Errors
-    /// As [`Self::inflate`].
     pub(crate) fn draw(&self, pixels: u64, place: &Place) -> Result<(), LoadError> {
         self.pixels.set(self.pixels.get().saturating_add(pixels));
         let most = self.distinct_bytes.get().saturating_mul(PIXELS_A_BYTE).saturating_add(FREE_PIXELS);

@@ -4,6 +4,8 @@
 //! Files are hostile until parsed: every length is checked before anything is allocated, every error says
 //! which file and where, and what is not supported is named, with whether it was ignored or is fatal.
 
+#![allow(missing_docs, reason = "serves the commands: any release may change what is public here")]
+
 mod bounds;
 mod channels;
 mod colour;
@@ -34,9 +36,6 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
 }
 
 /// As [`load`], with what the file leaves open.
-///
-/// # Errors
-/// As [`load`].
 pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let mut loaded = match extension.as_str() {

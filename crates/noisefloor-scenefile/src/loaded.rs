@@ -7,7 +7,6 @@ use std::path::Path;
 /// A scene from a file, and what the file says about how to render it.
 #[derive(Debug)]
 pub struct Loaded {
-    /// The scene.
     pub scene: Scene,
     /// Image size in pixels that the file asks for.
     pub size: Option<(usize, usize)>,

@@ -14,11 +14,9 @@ use noisefloor_ptwne::{Emission, MIN_AREA, MaterialId, Mesh, SceneBuilder, Scene
 /// Indexed triangles. Normals, texture coordinates and colours are one a position, or none.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Triangles {
-    /// Corners.
     pub(crate) positions: Vec<[f32; 3]>,
     /// Shading normals, of any length; 0 where there is none.
     pub(crate) normals: Vec<[f32; 3]>,
-    /// Texture coordinates.
     pub(crate) uvs: Vec<[f32; 2]>,
     /// Colours; none but of meshes that were asked for them.
     pub(crate) colours: Vec<[f32; 3]>,
@@ -33,9 +31,6 @@ pub(crate) struct Triangles {
 impl Triangles {
     /// Checks that indices are in range and positions finite. Normals and texture coordinates that are not
     /// finite become 0.
-    ///
-    /// # Errors
-    /// [`LoadError::Bad`] at `place`.
     pub(crate) fn check(&mut self, place: &Place) -> Result<(), LoadError> {
         let count = self.positions.len();
         if let Some(face) = self.indices.iter().position(|t| t.iter().any(|i| *i as usize >= count)) {

@@ -26,9 +26,7 @@ const PLAIN_PIXELS: u64 = 1 << 24;
 /// A picture as its file has it.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    /// Width in pixels.
     pub(crate) width: usize,
-    /// Height in pixels.
     pub(crate) height: usize,
     /// Row-major from the top left.
     pub(crate) samples: Samples,
@@ -69,9 +67,6 @@ pub(crate) fn read(folder: &Folder, path: &Path, place: &Place) -> Result<Pictur
 }
 
 /// Decodes the Radiance, PNG, JPEG, WebP or BMP file `bytes`, which are at `place`.
-///
-/// # Errors
-/// As [`read`].
 pub(crate) fn decode(folder: &Folder, bytes: &[u8], place: &Place) -> Result<Picture, LoadError> {
     decode_as(folder, bytes, None, place)
 }

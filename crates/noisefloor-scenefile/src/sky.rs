@@ -32,9 +32,6 @@ pub(crate) struct ClearSky {
 
 impl ClearSky {
     /// The map of this sky. Below the horizon all is black. `to_world` turns the sky, whose +z is up.
-    ///
-    /// # Errors
-    /// A message if a parameter is out of range.
     pub(crate) fn map(&self, to_world: DMat3) -> Result<EnvironmentMap, String> {
         let sun = self.sun.try_normalize().filter(|sun| sun.z >= 0.0);
         let sun = sun.ok_or("the sun is below the horizon")?;

@@ -5,7 +5,6 @@
 pub struct Advance<'a> {
     /// What is counted, such as `"zones cut into pairs"`. Another text begins another piece of work.
     pub what: &'static str,
-    /// Done so far.
     pub done: u64,
     /// To do in all.
     pub of: u64,

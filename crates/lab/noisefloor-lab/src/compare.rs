@@ -49,9 +49,6 @@ pub struct Setting<'a> {
 /// Lets the entrants watch one run of the source, and says what each took and left. Setting `cancel` ends
 /// the run after the batch that is under way. With a `denoiser`, every picture is also looked at denoised, without
 /// albedo and normals.
-///
-/// # Errors
-/// [`LabError`] if the source fails or gives no samples, or a criterion or the denoiser fails.
 pub fn run(
     source: &mut dyn ProgressiveSource,
     entrants: Vec<Entrant>,

@@ -22,7 +22,6 @@ pub enum LabError {
     /// A session refused samples.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// A criterion failed.
     #[error(transparent)]
     Criterion(#[from] CriterionError),
     /// Parameters out of range.
@@ -54,16 +53,10 @@ pub enum LabError {
     Table(#[from] TableError),
     /// A machine could not be trained.
     #[error("{machine}: {source}")]
-    Train {
-        /// Which machine.
-        machine: String,
-        /// Why not.
-        source: SvmTrainError,
-    },
+    Train { machine: String, source: SvmTrainError },
     /// A folder could not be made or read.
     #[error("{}: this folder cannot be made or read: {source}", path.display())]
     Folder {
-        /// The folder.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
@@ -90,52 +83,32 @@ pub enum LabError {
     },
     /// The kept reference is of something else.
     #[error("{}: is another reference: {what}; choose another folder, or overwrite it with --force", path.display())]
-    OtherReference {
-        /// The picture.
-        path: PathBuf,
-        /// What is different.
-        what: String,
-    },
+    OtherReference { path: PathBuf, what: String },
     /// A kept reference is not what the file beside it says.
     #[error("{}: is not the picture that reference.json describes; remove both, or use --force", path.display())]
-    KeptReference {
-        /// The picture.
-        path: PathBuf,
-    },
+    KeptReference { path: PathBuf },
     /// Zones that do not make one picture.
     #[error("{scene}: its zones are not squares of one size, which rivals need")]
-    Zones {
-        /// The scene.
-        scene: String,
-    },
+    Zones { scene: String },
     /// Too few images to know the noise of a scene.
     #[error("{scene}: too few images to tell its noise from its picture")]
-    TooFewImages {
-        /// The scene.
-        scene: String,
-    },
+    TooFewImages { scene: String },
     /// Too few groups of scenes to leave some out.
     #[error("leaving scenes out needs at least 3 groups of scenes; the corpus has {found}: {names}")]
     TooFewGroups {
         /// How many there are.
         found: usize,
-        /// Their names.
         names: String,
     },
     /// A subset of more pairs than there are.
     #[error("a subset of {asked} pairs is too large: at most {most}, half of the {all} pairs that there are")]
     Subset {
-        /// Pairs asked for.
         asked: usize,
-        /// Largest subset.
         most: usize,
         /// Pairs that there are.
         all: usize,
     },
     /// A result that was written reads back as another one.
     #[error("{}: has been changed since it was written; run again", path.display())]
-    Changed {
-        /// The result.
-        path: PathBuf,
-    },
+    Changed { path: PathBuf },
 }

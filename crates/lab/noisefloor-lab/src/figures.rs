@@ -30,9 +30,6 @@ const WIDEST_RATIO: f64 = 3.0;
 /// Draws thresholds of people and of the model over each scene, with their ratio as colour: (scene, map).
 /// `corpus` are the folders that the zones come from, where they are at hand: zones are then drawn over
 /// their pictures.
-///
-/// # Errors
-/// [`LabError::Corpus`] if a corpus cannot be read.
 pub(crate) fn map_zones(
     corpus: &[PathBuf],
     predictions: &[Prediction],
@@ -77,9 +74,6 @@ fn mark(zone: &Prediction, places: &Places) -> Option<TileMark> {
 
 /// Writes `zones-SCENE.png` of each scene, `thresholds.svg` and `reliability.svg` into the folder, which
 /// is made. `bins` is the reliability curve.
-///
-/// # Errors
-/// [`LabError`] if a corpus cannot be read or a file cannot be written.
 pub fn write_figures(
     folder: &Path,
     corpus: &[PathBuf],
@@ -141,17 +135,11 @@ const SIZE: (u32, u32) = (640, 560);
 const LETTERS: (&str, u32) = ("sans-serif", 15);
 
 /// Plots predicted against human thresholds as SVG, with lines at half, once and twice.
-///
-/// # Errors
-/// [`LabError::Plot`] if nothing can be drawn.
 pub(crate) fn plot_thresholds(predictions: &[Prediction]) -> Result<String, LabError> {
     svg(SIZE, |root| thresholds(root, predictions))
 }
 
 /// Plots observed against predicted probability as SVG; the area of a point is its share of the levels.
-///
-/// # Errors
-/// [`LabError::Plot`] if nothing can be drawn.
 pub(crate) fn plot_reliability(bins: &[ReliabilityBin]) -> Result<String, LabError> {
     svg(SIZE, |root| reliability(root, bins))
 }

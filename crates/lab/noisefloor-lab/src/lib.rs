@@ -11,6 +11,8 @@
 //! Results come first, as plain data that `serde` writes; plots, pictures and pages are made from them by
 //! functions of their own. Nothing here prints: long work reports an [`Advance`] to a [`Watch`].
 
+#![allow(missing_docs, reason = "serves the commands: any release may change what is public here")]
+
 mod advance;
 mod drawing;
 mod error;

@@ -35,7 +35,6 @@ use std::path::Path;
 /// Whether a result was computed now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResultState {
-    /// It is new.
     Computed,
     /// It was there already.
     Kept,
@@ -43,10 +42,6 @@ pub enum ResultState {
 
 /// Carries out all protocols. Creates the folder, and writes each result into it atomically as soon as it is
 /// there. Results that are there already are not computed again. `on_result` gets each result, with its file.
-///
-/// # Errors
-/// [`LabError`] if a corpus cannot be read or has fewer than three groups of scenes, a machine cannot be
-/// trained, or a result cannot be written.
 pub fn run(
     job: &Reproduction,
     folder: &Path,
@@ -63,9 +58,6 @@ pub fn run(
 }
 
 /// Writes reproduce.json and reproduce.md.
-///
-/// # Errors
-/// [`LabError::Write`] if a file cannot be written.
 pub fn write_report(folder: &Path, report: &ReproductionReport) -> Result<(), LabError> {
     write_json(&folder.join("reproduce.json"), report)?;
     write_text(&folder.join("reproduce.md"), &report.markdown())?;

@@ -44,26 +44,19 @@ pub struct RatedRival {
     pub mean_spp: f64,
     /// Mean thresholds, scene by scene.
     pub scenes: Vec<SceneMean>,
-    /// Zone by zone.
     pub predictions: Vec<Prediction>,
 }
 
 /// Mean thresholds of a scene, in samples per pixel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneMean {
-    /// The scene.
     pub scene: String,
-    /// Of people.
     pub human_spp: f64,
-    /// Of the predictor.
     pub predicted_spp: f64,
 }
 
 /// Scores rivals on the corpora, the constant of each fitted on the other groups of scenes. `viewing` is
 /// where a rival that asks for it takes people to have sat.
-///
-/// # Errors
-/// [`LabError`] if a corpus cannot be read or its zones are not squares of one size, or a criterion fails.
 pub fn rate(
     folders: &[PathBuf],
     rivals: &[&'static Rival],

@@ -15,7 +15,6 @@ const RESAMPLES: u64 = 1000;
 /// A fitted line T′ = a·T + b and how far it can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct AudienceFit {
-    /// The line.
     pub line: Audience,
     /// Pearson correlation r of the pairs, in [−1, 1]; `None` if all T′ are the same.
     pub correlation: Option<f64>,
@@ -40,24 +39,16 @@ pub enum AudienceFitError {
     Threshold {
         /// Number of the pair, from 1.
         pair: usize,
-        /// T.
         observers: f64,
-        /// T′.
         audience: f64,
     },
     /// All T are the same.
     #[error("all thresholds of the observers are {0}: a line needs at least two different ones")]
     Constant(f64),
-    /// The line falls.
     #[error(
         "the line falls (T' = {slope:.3} T + {offset:.1}): this audience would see noise longest where the observers see it shortest; check which column is which"
     )]
-    Falling {
-        /// Its slope.
-        slope: f64,
-        /// Its offset.
-        offset: f64,
-    },
+    Falling { slope: f64, offset: f64 },
 }
 
 impl AudienceFit {
@@ -80,10 +71,6 @@ impl AudienceFit {
     /// assert_eq!(fit.line, Audience { slope: 1.5, offset: 0.0 });
     /// # Ok::<(), noisefloor_learn::AudienceFitError>(())
     /// ```
-    ///
-    /// # Errors
-    /// [`AudienceFitError`] if there are too few or too many pairs, a threshold is not one, all T are the
-    /// same, or the line falls.
     pub fn new(pairs: &[(f64, f64)]) -> Result<Self, AudienceFitError> {
         if !(MIN_PAIRS..=MAX_PAIRS).contains(&pairs.len()) {
             return Err(AudienceFitError::Pairs(pairs.len()));

@@ -32,7 +32,6 @@ pub const VISIBLE_CHOICES: DescriptorKind = DescriptorKind {
 /// One of the choices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The constants.
     pub name: String,
     /// The zones, described so.
     pub table: Table,
@@ -96,9 +95,6 @@ impl TileDescriptor for VisibleChoices {
 }
 
 /// A table for each choice, from one of [`VISIBLE_CHOICES`]. What is weighed is no choice: weights are shrunk instead.
-///
-/// # Errors
-/// [`DescriptorError`] if the table is of another descriptor.
 pub fn choices(table: &Table) -> Result<Vec<Choice>, DescriptorError> {
     if table.descriptor.name() != VISIBLE_CHOICES.name {
         let name = table.descriptor.name().to_owned();

@@ -37,10 +37,6 @@ pub struct Corpus {
 impl Corpus {
     /// Reads `thresholds.csv` and checks that the images of every zone are there, by name; opens none of
     /// them.
-    ///
-    /// # Errors
-    /// [`CorpusError`] with the line of a malformed row, or with the name of what is missing, doubled, or
-    /// leaves a gap.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, CorpusError> {
         let dir = dir.as_ref();
         let rows = table::read(&dir.join("thresholds.csv"))?;
@@ -89,21 +85,12 @@ impl Corpus {
 
     /// Every real image of every zone of a scene, each image decoded once however many zones share it.
     /// Running means come image by image, batches zone by zone, samples ascending.
-    ///
-    /// # Errors
-    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if its folders have changed
-    /// since.
     pub fn scene_levels(&self, scene: &str) -> Result<JudgedImages<'_>, CorpusError> {
         JudgedImages::of(&self.scene_zones(scene)?)
     }
 
     /// The noise-free reference of a scene in linear light, cut into patches like those of its images, in the
     /// order of its zones; `None` if there is none.
-    ///
-    /// # Errors
-    /// [`CorpusError::Unknown`] if there is no such scene, [`CorpusError::Stack`] if the reference cannot be
-    /// read,
-    /// [`CorpusError::Zone`] if a zone lies outside it.
     pub(crate) fn scene_reference(&self, scene: &str) -> Result<Option<Vec<Patch>>, CorpusError> {
         levels::reference(&self.scene_zones(scene)?)
     }

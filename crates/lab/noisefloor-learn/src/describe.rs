@@ -33,7 +33,6 @@ const REACH: f64 = 8.0;
 /// Folders with corpora, and which scenes belong together.
 #[derive(Clone, Copy, Debug)]
 pub struct Corpora<'a> {
-    /// A corpus each.
     pub folders: &'a [PathBuf],
     /// The group of a scene, by its name: scenes of one group show the same room, and are left out together.
     pub group_of: fn(&str) -> &str,
@@ -53,9 +52,6 @@ impl<'a> Corpora<'a> {
 ///
 /// [`Evidence::Reference`] holds pictures against the scene's reference (`reference.exr`); where
 /// it has none, the most converged picture stands in for it.
-///
-/// # Errors
-/// [`TableError`] if a corpus cannot be read, or a zone has too few images.
 pub fn describe_corpora(
     corpora: Corpora<'_>,
     descriptor: &Descriptor,
@@ -73,10 +69,6 @@ pub fn describe_corpora(
 /// reference, or that image. All these levels are synthesised, from the two realisations of the noise in
 /// turn; the real images, except the most converged one, are there besides. `on_zone(done, all)` reports
 /// progress.
-///
-/// # Errors
-/// [`TableError`] if a corpus cannot be read, or a zone has too few images or is smaller than `edge`×`edge`
-/// pixels.
 pub fn describe_pairs(
     corpora: Corpora<'_>,
     descriptor: &Descriptor,

@@ -6,35 +6,20 @@ use thiserror::Error;
 /// Why a table could not be computed, read or written.
 #[derive(Debug, Error)]
 pub enum TableError {
-    /// The corpus.
     #[error(transparent)]
     Corpus(#[from] CorpusError),
     /// A zone has too few images.
     #[error(
         "{scene}, zone {zone}: {images} images are too few; two independent sets of samples and a converged picture are needed"
     )]
-    TooFew {
-        /// The scene.
-        scene: String,
-        /// The zone.
-        zone: u32,
-        /// Its images.
-        images: usize,
-    },
+    TooFew { scene: String, zone: u32, images: usize },
     /// The reference has another size than the images.
     #[error("{scene}, zone {zone}: reference.exr has not the size of the full picture")]
-    Reference {
-        /// The scene.
-        scene: String,
-        /// The zone.
-        zone: u32,
-    },
+    Reference { scene: String, zone: u32 },
     /// The descriptor is for tiles of another size.
     #[error("{scene}, zone {zone}: {source}")]
     Descriptor {
-        /// The scene.
         scene: String,
-        /// The zone.
         zone: u32,
         /// What does not fit.
         source: noisefloor::descriptor::DescriptorError,

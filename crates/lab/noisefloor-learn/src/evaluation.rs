@@ -10,7 +10,6 @@ use serde::Serialize;
 /// Scores of one way to predict.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PredictionScores {
-    /// Of thresholds.
     #[serde(flatten)]
     pub scores: Scores,
     /// Share of real pictures that are classified as people did; `None` without any.
@@ -29,9 +28,7 @@ pub struct Baselines {
 /// Scores of one scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneScores {
-    /// The scene.
     pub scene: String,
-    /// Of its zones.
     #[serde(flatten)]
     pub summary: PredictionScores,
     /// Of the same zones.
@@ -43,19 +40,15 @@ pub struct SceneScores {
 pub struct Evaluation {
     /// `leave-one-scene-out`, or the digest of the model scored.
     pub predicted_by: String,
-    /// Over all zones.
     #[serde(flatten)]
     pub summary: PredictionScores,
     /// The middle 90 % of the error factor over groups of scenes drawn again; see [`error_interval`]. `None`
     /// with fewer than three groups.
     pub error_interval: Option<(f64, f64)>,
-    /// Over all zones.
     pub baselines: Baselines,
-    /// Scene by scene.
     pub scenes: Vec<SceneScores>,
     /// P against how often people saw no noise.
     pub reliability: Vec<ReliabilityBin>,
-    /// Of that curve.
     pub calibration_error: f64,
     /// Zones whose human threshold is only a lower bound: not in the factors.
     pub censored_zones: usize,

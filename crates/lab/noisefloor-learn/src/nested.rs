@@ -14,7 +14,6 @@ use std::collections::BTreeSet;
 /// What was chosen without a group of scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Chosen {
-    /// The group.
     pub without: String,
     /// [`Choice::name`].
     pub choice: String,
@@ -31,9 +30,6 @@ pub struct Chosen {
 /// is worse than the best by no more than the standard error of their difference over groups (Breiman et al. 1984,
 /// "Classification and Regression Trees", §3.4.3), so that choices are to be given with what is to stay first. Then C, γ
 /// and the calibration of P, in the same way. `on_fold` is called before each group with its name.
-///
-/// # Errors
-/// [`TrainError`] if there are no choices, fewer than four groups, or training fails.
 pub fn choose_and_leave_out(
     choices: &[Choice],
     params: &TrainParams,

@@ -25,7 +25,6 @@ pub enum Learner {
 /// How a model is to be trained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainParams {
-    /// What is trained.
     pub learner: Learner,
     /// Pairs of C and γ to choose from, by leave-one-group-out.
     pub candidates: Vec<SvmParams>,
@@ -69,7 +68,6 @@ impl TrainParams {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TrainError {
-    /// The machine.
     #[error(transparent)]
     Svm(#[from] SvmTrainError),
     /// All examples are noisy, or all are converged.
@@ -83,9 +81,7 @@ pub enum TrainError {
     Alike {
         /// The group that was left out, if one was.
         without: Option<String>,
-        /// All examples.
         examples: usize,
-        /// What they are.
         converged: bool,
     },
     /// What people said has nothing to do with what was measured of the noise.
@@ -100,7 +96,6 @@ pub enum TrainError {
     Unrelated {
         /// The groups of which this is so; of all together it is.
         groups: Vec<String>,
-        /// All groups.
         of: usize,
     },
     /// A parameter out of range.
@@ -116,14 +111,7 @@ pub enum TrainError {
     },
     /// Leaving groups out needs groups.
     #[error("leaving scenes out needs at least {needed} groups of scenes; the corpus has {found}: {names}")]
-    Groups {
-        /// Groups needed.
-        needed: usize,
-        /// Groups found.
-        found: usize,
-        /// Their names.
-        names: String,
-    },
+    Groups { needed: usize, found: usize, names: String },
     /// What was trained is not a model: numbers of the descriptor were removed.
     #[error("the result can be scored, but is not a model: {0}")]
     Model(#[from] ModelError),

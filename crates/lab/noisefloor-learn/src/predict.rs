@@ -26,12 +26,9 @@ fn log_odds(p: f64) -> f64 {
     (p / (1.0 - p)).ln()
 }
 
-/// One zone's prediction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
-    /// Scene.
     pub scene: String,
-    /// Zone.
     pub zone: u32,
     /// Human threshold, in samples per pixel.
     pub human_spp: f64,

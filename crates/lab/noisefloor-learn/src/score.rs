@@ -62,7 +62,6 @@ pub struct ReliabilityBin {
     pub predicted: f64,
     /// Mean of what was observed.
     pub observed: f64,
-    /// Levels.
     pub levels: usize,
 }
 

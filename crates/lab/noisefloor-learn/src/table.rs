@@ -21,21 +21,17 @@ pub enum Origin {
 /// noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Level {
-    /// Samples per pixel.
     pub spp: f64,
-    /// Rendered or synthesised.
     pub origin: Origin,
     /// Standard deviation of the noise mask (σ = 1) of the residual over the zone, in display luminance: what
     /// the constant-noise baseline goes by.
     pub noise: f32,
-    /// The raw descriptor.
     pub descriptor: Vec<f32>,
 }
 
 /// One zone of one scene: what people said of it, and its descriptor from noisy to converged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Zone {
-    /// Scene.
     pub scene: String,
     /// Scenes of one group show the same room, and are left out together.
     pub group: String,
@@ -59,7 +55,6 @@ pub struct Zone {
 /// Descriptors of a corpus: all that training and evaluation need of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Which descriptor.
     pub descriptor: Descriptor,
     /// What the zones were compared with.
     pub evidence: Evidence,
@@ -69,7 +64,6 @@ pub struct Table {
     pub viewing: Viewing,
     /// What the numbers of each level are: those of the descriptor, less what was taken away.
     pub numbers: Vec<String>,
-    /// The zones.
     pub zones: Vec<Zone>,
     /// What single people said of tiles of other pictures: examples to train on, never scored as thresholds.
     pub answers: Vec<Answer>,
@@ -112,9 +106,6 @@ impl Zone {
 impl Table {
     /// Takes away numbers of the descriptor, named as in its columns: to see what each is worth. A machine
     /// that is trained on what is left can be scored, but is not a model.
-    ///
-    /// # Errors
-    /// The name that is not a column.
     pub fn without(mut self, names: &[String]) -> Result<Self, String> {
         for name in names {
             let at = self.numbers.iter().position(|n| n == name).ok_or_else(|| name.clone())?;

@@ -42,9 +42,6 @@ struct Head {
 }
 
 /// Writes a table as CSV.
-///
-/// # Errors
-/// [`TableError::Csv`] if it cannot be written.
 pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> {
     let head = Head {
         descriptor: table.descriptor.spec(),
@@ -85,17 +82,11 @@ pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> 
 }
 
 /// Reads a table that [`write_table`] wrote, with a built-in descriptor.
-///
-/// # Errors
-/// [`TableError`] naming the first line that is not as it should be.
 pub fn read_table(from: impl Read) -> Result<Table, TableError> {
     read_table_with(from, &[])
 }
 
 /// Reads a table whose descriptor is one of `kinds`, or built in.
-///
-/// # Errors
-/// [`TableError`] as in [`read_table`].
 pub fn read_table_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Table, TableError> {
     // What it holds.
     let mut text = String::new();

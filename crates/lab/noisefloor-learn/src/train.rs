@@ -29,9 +29,6 @@ fn check(table: &Table, params: &TrainParams, needed: usize) -> Result<(), Train
 
 /// Predicts every zone, at that share of people, by a model that has seen nothing of its group, not even to choose
 /// C, γ or the sigmoid. `on_fold` is called before each group with its name.
-///
-/// # Errors
-/// [`TrainError`] if the table has fewer than three groups, or training fails.
 pub fn leave_one_scene_out(
     table: &Table,
     params: &TrainParams,
@@ -55,9 +52,6 @@ pub fn leave_one_scene_out(
 
 /// P of each of the table's answers, in their order, by a model that has learned nothing of its group,
 /// neither answers nor zones. `on_fold` is called before each group of answers with its name.
-///
-/// # Errors
-/// [`TrainError`] if fewer than two groups of zones are left, or training fails.
 pub fn leave_answers_out(
     table: &Table,
     params: &TrainParams,
@@ -82,9 +76,6 @@ pub fn leave_answers_out(
 /// Trains a model on all of a table. `corpus` says in words where it comes from; `leave_one_scene_out` are
 /// the scores of
 /// [`leave_one_scene_out`], where they were computed.
-///
-/// # Errors
-/// [`TrainError`] if the table has fewer than two groups, or training fails.
 pub fn train(
     table: &Table,
     params: &TrainParams,

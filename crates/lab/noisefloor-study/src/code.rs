@@ -8,9 +8,6 @@ const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 const LENGTH: usize = 12;
 
 /// Draws a code from the operating system's random numbers.
-///
-/// # Errors
-/// [`StoreError::Closed`] if the system has none to give.
 pub(crate) fn draw() -> Result<String, StoreError> {
     let mut bytes = [0; LENGTH];
     getrandom::fill(&mut bytes).map_err(|_| StoreError::Closed)?;
@@ -18,9 +15,6 @@ pub(crate) fn draw() -> Result<String, StoreError> {
 }
 
 /// Draws a seed for the order of trials from the operating system's random numbers.
-///
-/// # Errors
-/// [`StoreError::Closed`] if the system has none to give.
 pub(crate) fn draw_seed() -> Result<u64, StoreError> {
     let mut bytes = [0; 8];
     getrandom::fill(&mut bytes).map_err(|_| StoreError::Closed)?;

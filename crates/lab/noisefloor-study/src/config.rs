@@ -44,11 +44,8 @@ pub struct Study {
     pub seed: u64,
     /// Groups that observers choose from; may be empty.
     pub groups: Vec<String>,
-    /// How participants arrive.
     pub participants: Participants,
-    /// Rules of exclusion.
     pub screening: Screening,
-    /// Viewing conditions accepted.
     pub viewing: ViewingLimits,
     /// Questions before the trials.
     pub questions: Vec<Question>,
@@ -90,9 +87,6 @@ impl Study {
     /// Reads a study file. Relative paths start at its folder. Opens the most converged picture of each
     /// stack;
     /// [`Study::check_pictures`] opens the others.
-    ///
-    /// # Errors
-    /// [`StudyError`] if the file is malformed, or a stack or language is incomplete.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, StudyError> {
         let path = path.as_ref();
         let io = |source| StudyError::Io { path: path.to_owned(), source };
@@ -150,9 +144,6 @@ impl Study {
     }
 
     /// Opens every picture, so that none fails while an observer is looking.
-    ///
-    /// # Errors
-    /// [`StudyError`] of the first stack with a broken picture, or one of another size.
     pub fn check_pictures(&self) -> Result<(), StudyError> {
         self.stacks.iter().try_for_each(StudyStack::check_pictures)
     }
@@ -416,7 +407,6 @@ impl Screening {
 pub struct Question {
     /// Name of the column in the data.
     pub id: String,
-    /// Kind of answer.
     pub kind: QuestionKind,
     /// Whether it may be left empty.
     #[serde(default)]
@@ -434,7 +424,6 @@ pub struct Question {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum QuestionKind {
-    /// A number.
     Number,
     /// One of the options.
     Choice,

@@ -15,7 +15,6 @@ pub enum StudyError {
     /// The study file cannot be read.
     #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
     Io {
-        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
@@ -23,7 +22,6 @@ pub enum StudyError {
     /// The study file is invalid.
     #[error("{}: {what}; docs/studies.md lists what a study file holds", path.display())]
     File {
-        /// The file.
         path: PathBuf,
         /// What is wrong, with the line number if known.
         what: String,
@@ -31,9 +29,7 @@ pub enum StudyError {
     /// A stack has too few or too many pictures.
     #[error("stack {name}: {levels} pictures named by their samples per pixel; a stack needs 2 to {max}")]
     Levels {
-        /// The stack.
         name: String,
-        /// Pictures found.
         levels: usize,
         /// Most that are taken.
         max: usize,
@@ -45,7 +41,6 @@ pub enum StudyError {
         path.display()
     )]
     Size {
-        /// The picture.
         path: PathBuf,
         /// Its width and height in pixels.
         got: (usize, usize),
@@ -54,14 +49,10 @@ pub enum StudyError {
     },
     /// A picture has pixels that are not finite.
     #[error("{}: has pixels that are not finite; fix the render", path.display())]
-    NotFinite {
-        /// The picture.
-        path: PathBuf,
-    },
+    NotFinite { path: PathBuf },
     /// A picture cannot be cut into tiles.
     #[error("stack {name}: {source}")]
     Tile {
-        /// The stack.
         name: String,
         /// Which limit was exceeded.
         source: TileError,
@@ -95,33 +86,21 @@ pub enum StudyError {
 /// Why answers could not be stored or found. Acknowledged answers are never lost.
 #[derive(Debug, Error)]
 pub enum StoreError {
-    /// SQLite refused.
     #[error(
         "{}: {source}; check the free space and that the file is a database of `noisefloor-lab study`",
         path.display()
     )]
-    Database {
-        /// The database.
-        path: PathBuf,
-        /// What SQLite said.
-        source: rusqlite::Error,
-    },
+    Database { path: PathBuf, source: rusqlite::Error },
     /// The database holds the answers to another study.
     #[error(
         "{}: holds answers to another study, or to an earlier design of this one; \
          name another `database` in the study file",
         path.display()
     )]
-    OtherStudy {
-        /// The database.
-        path: PathBuf,
-    },
+    OtherStudy { path: PathBuf },
     /// The database does not hold disagreements.
     #[error("{}: is not a database of `noisefloor-lab explore`; name another with --database", path.display())]
-    NotDisagreements {
-        /// The database.
-        path: PathBuf,
-    },
+    NotDisagreements { path: PathBuf },
     /// No session has this code.
     #[error("no session has the code {0}; check it, or begin a new session")]
     Unknown(String),
@@ -130,27 +109,17 @@ pub enum StoreError {
     NoLink,
     /// A different event already has this number.
     #[error("event {seq} of session {code} already exists with other content; reload the session")]
-    Conflict {
-        /// The session.
-        code: String,
-        /// The number.
-        seq: u64,
-    },
+    Conflict { code: String, seq: u64 },
     /// The writer thread has ended.
     #[error("answers can no longer be stored because the database thread has ended; restart the server")]
     Closed,
     /// The stored trials of a session are not of the study.
     #[error("the trials stored for session {code} do not fit the study; was the database edited by hand?")]
-    Plan {
-        /// The session.
-        code: String,
-    },
+    Plan { code: String },
     /// An event in the database does not fit the study.
     #[error("event {seq} of session {code} does not fit the study: {what}; was the database edited by hand?")]
     Event {
-        /// The session.
         code: String,
-        /// The number.
         seq: u64,
         /// What is wrong with it.
         what: String,

@@ -51,14 +51,11 @@ pub enum StudyEvent {
     Answer {
         /// Number of the trial.
         trial: u32,
-        /// The answer.
         choice: Choice,
         /// When the pictures were shown.
         timing: TrialTiming,
     },
-    /// Pauses.
     Pause,
-    /// Resumes.
     Resume,
 }
 
@@ -99,13 +96,11 @@ impl TrialTiming {
     }
 }
 
-/// An answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Choice {
     /// Validation: the two pictures are identical.
     Identical,
-    /// Validation: they differ.
     Different,
     /// Forced choice: the first interval was noisy.
     First,
@@ -121,7 +116,6 @@ pub struct Envelope {
     pub seq: u64,
     /// Clock of the page, in milliseconds since 1970.
     pub at: u64,
-    /// The event.
     pub event: StudyEvent,
 }
 

@@ -45,9 +45,6 @@ pub struct ExploreServer {
 impl ExploreServer {
     /// Reads the pictures, opens the database and binds the address. Port 0 picks a free port. `exposure`
     /// says under which other names and behind which proxies it may be reached; a base path is ignored.
-    ///
-    /// # Errors
-    /// [`StudyError`] if a picture or the database cannot be read, or the address is in use.
     pub async fn bind(
         setup: ExploreSetup,
         address: SocketAddr,
@@ -74,15 +71,11 @@ impl ExploreServer {
         Ok(Self { listening, router: router(app, guard) })
     }
 
-    /// The bound address.
     pub fn address(&self) -> SocketAddr {
         self.listening.address()
     }
 
     /// Serves until `stop` resolves.
-    ///
-    /// # Errors
-    /// [`StudyError::Pages`] if the socket fails.
     pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), StudyError> {
         self.listening.serve(self.router, stop).await;
         Ok(())

@@ -45,6 +45,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![allow(missing_docs, reason = "serves the commands: any release may change what is public here")]
+
 pub mod analysis;
 mod code;
 mod config;

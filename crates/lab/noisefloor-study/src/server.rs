@@ -47,9 +47,6 @@ impl fmt::Debug for StudyServer {
 impl StudyServer {
     /// Opens the answers of a study and binds the address. Port 0 picks a free port. `exposure` says under
     /// which other names, behind which proxies and under which path the server may be reached.
-    ///
-    /// # Errors
-    /// [`StudyError`] if the answers cannot be opened, or the address is in use.
     pub async fn bind(
         study: Arc<Study>,
         address: SocketAddr,
@@ -81,7 +78,6 @@ impl StudyServer {
         self
     }
 
-    /// The bound address.
     pub fn address(&self) -> SocketAddr {
         self.listening.address()
     }
@@ -92,9 +88,6 @@ impl StudyServer {
     }
 
     /// Serves until `stop` resolves, and answers the requests that arrived until then.
-    ///
-    /// # Errors
-    /// None at present.
     pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), StudyError> {
         self.listening.serve(self.router, stop).await;
         Ok(())

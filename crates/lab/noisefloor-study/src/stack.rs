@@ -119,7 +119,6 @@ impl StudyStack {
         &self.folder
     }
 
-    /// The tile grid.
     pub fn grid(&self) -> TileGrid {
         self.grid
     }
@@ -162,9 +161,6 @@ impl StudyStack {
 
     /// A level as displayed, its first frame if it is a loop: sRGB-encoded, three bytes a pixel, row-major.
     ///
-    /// # Errors
-    /// [`StudyError`] if the file is broken, or differs from the reference in size or kind.
-    ///
     /// # Panics
     /// If there is no such level.
     pub fn shown(&self, level: u32) -> Result<Vec<u8>, StudyError> {
@@ -196,9 +192,6 @@ impl StudyStack {
     }
 
     /// The tiles of a frame of a level as PNG files, row-major.
-    ///
-    /// # Errors
-    /// Those of [`StudyStack::shown`].
     ///
     /// # Panics
     /// If there is no such level or frame.

@@ -15,9 +15,6 @@ const MOST_AT_ONCE: u64 = 64;
 /// `go_on` is told the level and the samples so far, and may stop it by returning false; the levels finished
 /// by then are kept. `finish` sees each picture before it is written, and may denoise it; the last level, which
 /// is the reference, is written as rendered.
-///
-/// # Errors
-/// [`StudyError`] if the levels do not increase, the source fails or ends early, or a file cannot be written.
 pub fn render_stack(
     source: &mut (impl ProgressiveSource + ?Sized),
     levels: &[u64],

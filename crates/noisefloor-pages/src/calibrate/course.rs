@@ -23,7 +23,6 @@ const REPORTED: f64 = 0.8;
 const ANSWERS: [u32; 2] = [24, 60];
 /// Strongest and weakest noise: ln of the samples over the threshold of the model's observers.
 const LEVELS: [f64; 2] = [-2.5, 2.0];
-/// Number of levels.
 const STEPS: usize = 46;
 /// The first trials are easy, to show what is asked, and so is one trial of so many after that.
 const EASY_FIRST: u32 = 2;
@@ -85,7 +84,6 @@ pub enum CalibrationRefusal {
     Guessed {
         /// Easy trials that were answered wrongly.
         missed: u32,
-        /// Easy trials.
         of: u32,
     },
     /// The factor lies beyond the noise that can be shown.
@@ -99,7 +97,6 @@ pub enum CalibrationRefusal {
     },
 }
 
-/// One person's calibration.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     quest: QuestPlus,
@@ -142,7 +139,6 @@ impl Calibration {
         begun
     }
 
-    /// Where it is.
     pub fn stage(&self) -> CalibrationStage {
         self.stage
     }

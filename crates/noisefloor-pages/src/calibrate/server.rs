@@ -109,9 +109,6 @@ impl fmt::Debug for CalibrateServer {
 
 impl CalibrateServer {
     /// Binds the address. Port 0 picks a free port.
-    ///
-    /// # Errors
-    /// [`PagesError::Listen`] if the address is in use or not of this machine.
     pub fn bind(setup: CalibrateSetup, address: SocketAddr, exposure: &Exposure) -> Result<Self, PagesError> {
         let failed = |source: io::Error| PagesError::Listen { address: address.to_string(), source };
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
@@ -122,7 +119,6 @@ impl CalibrateServer {
         Ok(Self { router: router(app.clone(), guard), listening, app, runtime })
     }
 
-    /// The bound address.
     pub fn address(&self) -> SocketAddr {
         self.listening.address()
     }

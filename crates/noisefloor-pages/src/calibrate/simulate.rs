@@ -5,7 +5,6 @@ use super::tiles::CalibrationTile;
 use crate::random::seeded;
 use noisefloor::{Oracle, Viewing};
 
-/// A simulated person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedEyes {
     /// How many times the samples of the model's observers they need, above 0.

@@ -12,9 +12,6 @@ const MAX_BODY: usize = 16 << 10;
 const BODY_TIME: Duration = Duration::from_secs(10);
 
 /// Reads a body of at most 16 kB as JSON.
-///
-/// # Errors
-/// A [`Refusal`] if it is longer, slow, or not what `T` expects.
 pub async fn read_json<T: DeserializeOwned>(body: Body) -> Result<T, Refusal> {
     let bytes = read_bytes(body, MAX_BODY, BODY_TIME, "send one event at a time").await?;
     serde_json::from_slice(&bytes).map_err(|error| {
@@ -24,9 +21,6 @@ pub async fn read_json<T: DeserializeOwned>(body: Body) -> Result<T, Refusal> {
 }
 
 /// Reads a body of at most `most` bytes; `instead` is what to do if it is longer.
-///
-/// # Errors
-/// A [`Refusal`] if it is longer, or takes longer than `time`.
 pub async fn read_bytes(body: Body, most: usize, time: Duration, instead: &str) -> Result<Bytes, Refusal> {
     let refuse = |status, what: String, do_: &str| Err(Refusal::new(status, what, "body", do_));
     match tokio::time::timeout(time, to_bytes(body, most)).await {

@@ -78,9 +78,6 @@ impl Guard {
     }
 
     /// Counts a session without a link, which anybody can begin.
-    ///
-    /// # Errors
-    /// A [`Refusal`] after too many sessions from an address within a minute.
     pub fn begins(&self, client: Client) -> Result<(), Refusal> {
         let mut begun = self.begun.lock().unwrap_or_else(PoisonError::into_inner);
         if begun.len() >= MOST_ADDRESSES {

@@ -39,7 +39,6 @@ const DRAIN_TIME: Duration = Duration::from_secs(3);
 /// Pause after the operating system refused a connection, for example because too many files are open.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// A bound address.
 #[derive(Debug)]
 pub struct Listening {
     listener: TcpListener,
@@ -52,9 +51,6 @@ pub struct Listening {
 impl Listening {
     /// Binds an address; port 0 picks a free port. Proxies that are trusted may open as many connections as
     /// they like.
-    ///
-    /// # Errors
-    /// [`PagesError::Listen`] if the address is in use or not of this machine.
     pub async fn bind(address: SocketAddr, exposure: &Exposure) -> Result<Self, PagesError> {
         let failed = |source| PagesError::Listen { address: address.to_string(), source };
         let listener = TcpListener::bind(address).await.map_err(failed)?;
@@ -62,7 +58,6 @@ impl Listening {
         Ok(Self { listener, address, proxies: exposure.proxies.clone(), limits: LIMITS })
     }
 
-    /// The bound address.
     pub fn address(&self) -> SocketAddr {
         self.address
     }

@@ -7,7 +7,6 @@ use axum::http::{StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
-/// A refused request.
 #[derive(Debug)]
 pub struct Refusal {
     status: StatusCode,

@@ -67,7 +67,6 @@ impl Scale {
 }
 
 impl Part {
-    /// All surfaces.
     pub(super) fn all(surfaces: &[impl Bounded]) -> Self {
         let mut part = Self { range: 0..surfaces.len(), bounds: Aabb::EMPTY, centres: Aabb::EMPTY, cuts: 0 };
         let boxes = |surfaces: &[_]| {

@@ -187,7 +187,6 @@ impl Hierarchy {
         self.bounds
     }
 
-    /// Number of instances.
     pub(crate) fn instances(&self) -> usize {
         self.instances.len()
     }

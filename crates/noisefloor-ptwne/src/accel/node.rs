@@ -9,7 +9,6 @@ pub(super) const LEAF: u32 = 1 << 31;
 /// How many boxes a node has.
 pub(super) const WIDTH: usize = 8;
 
-/// Eight numbers.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Lanes(pub(super) [Vec4; 2]);

@@ -8,11 +8,22 @@ use crate::math::Vec3;
 pub(crate) enum Shape {
     /// The points `corner + u·e1 + v·e2` for u, v ≥ 0: u, v ≤ 1 in a parallelogram (`whole`), u + v ≤ 1 in a
     /// triangle.
-    Planar { corner: glam::Vec3, e1: glam::Vec3, e2: glam::Vec3, whole: bool },
-    /// A sphere.
-    Sphere { centre: glam::Vec3, radius: f32 },
+    Planar {
+        corner: glam::Vec3,
+        e1: glam::Vec3,
+        e2: glam::Vec3,
+        whole: bool,
+    },
+    Sphere {
+        centre: glam::Vec3,
+        radius: f32,
+    },
     /// An ellipse: the points `centre + u·e1 + v·e2` with u² + v² ≤ 1.
-    Disk { centre: glam::Vec3, e1: glam::Vec3, e2: glam::Vec3 },
+    Disk {
+        centre: glam::Vec3,
+        e1: glam::Vec3,
+        e2: glam::Vec3,
+    },
 }
 
 /// A surface, by its index.
@@ -38,7 +49,6 @@ impl Shape {
         }
     }
 
-    /// The shape, translated.
     pub(crate) fn translated(self, by: glam::Vec3) -> Self {
         match self {
             Shape::Planar { corner, e1, e2, whole } => Shape::Planar { corner: corner + by, e1, e2, whole },

@@ -228,7 +228,6 @@ struct Branch<L> {
     nodes: Vec<Node>,
     leaves: L,
     root: u32,
-    /// Levels of nodes.
     depth: usize,
 }
 

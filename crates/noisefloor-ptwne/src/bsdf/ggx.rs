@@ -31,7 +31,6 @@ impl Facets {
     }
 }
 
-/// Microfacets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ggx {
     /// α, or the geometric mean of those along both axes.

@@ -45,18 +45,12 @@ pub struct SceneBuilder {
 
 impl SceneBuilder {
     /// An empty scene. The name appears in reports.
-    ///
-    /// # Errors
-    /// [`SceneError`] if the camera has no view direction, or a number is out of range.
     pub fn new(name: impl Into<String>, camera: Camera) -> Result<Self, SceneError> {
         camera.check()?;
         Ok(Self { name: name.into(), camera, parts: Parts::default(), coats: vec![], open_object: None })
     }
 
     /// Sets how the camera projects, besides its field of view.
-    ///
-    /// # Errors
-    /// [`SceneError`] if a number is out of range.
     pub fn optics(&mut self, optics: Optics) -> Result<(), SceneError> {
         optics.check()?;
         self.parts.optics = optics;
@@ -85,9 +79,6 @@ impl SceneBuilder {
     }
 
     /// Adds a light without size.
-    ///
-    /// # Errors
-    /// [`SceneError`] if a number is not finite or out of range, or a direction is zero.
     pub fn punctual(&mut self, light: Punctual) -> Result<(), SceneError> {
         self.parts.lights.push(Light::punctual(light)?);
         Ok(())
@@ -95,9 +86,6 @@ impl SceneBuilder {
 
     /// Adds a [`Punctual::Projector`] with its picture, whose channels are in 0…1; other lights without size
     /// take no notice of the picture.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::punctual`]; and if the picture has the wrong number of pixels.
     pub fn projector(&mut self, light: Punctual, picture: Texture) -> Result<(), SceneError> {
         let mut light = Light::punctual(light)?;
         if matches!(light.shape, LightShape::Projector { .. }) {
@@ -129,9 +117,6 @@ impl SceneBuilder {
     }
 
     /// As [`SceneBuilder::parallelogram`], with the texture coordinates of the corner and of the ends of its edges.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::parallelogram`].
     pub fn mapped_parallelogram(
         &mut self,
         corner: [f32; 3],
@@ -148,9 +133,6 @@ impl SceneBuilder {
     }
 
     /// Adds an ellipse: `centre` + u·`e1` + v·`e2` for u² + v² ≤ 1. Texture coordinates are (u + 1, v + 1)/2.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::parallelogram`].
     pub fn disk(
         &mut self,
         centre: [f32; 3],
@@ -166,9 +148,6 @@ impl SceneBuilder {
 
     /// Adds an ellipse with texture coordinates in rings: u = √(a² + b²) at `centre` + a·`e1` + b·`e2`, and v
     /// = 1 − φ/2π, where φ is the angle of (a, b); φ/2π if `reversed`.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::parallelogram`].
     pub fn ringed_disk(
         &mut self,
         centre: [f32; 3],
@@ -201,9 +180,6 @@ impl SceneBuilder {
 
     /// As [`SceneBuilder::sphere`], with axes of length 1 for its texture coordinates: the second points to
     /// the top, v = 1, and u runs from minus the first over minus the third.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::sphere`].
     pub fn turned_sphere(
         &mut self,
         centre: [f32; 3],
@@ -302,11 +278,6 @@ impl SceneBuilder {
         Ok(left_out)
     }
 
-    /// Builds the scene.
-    ///
-    /// # Errors
-    /// [`SceneError::Object`] if an object has not ended; [`SceneError::Memory`] if there is too little for the
-    /// hierarchy.
     pub fn build(self) -> Result<Scene, SceneError> {
         if self.open_object.is_some() {
             return Err(SceneError::Object("an object without its end"));
@@ -439,9 +410,6 @@ fn index(count: usize) -> Result<u32, SceneError> {
 
 impl SceneBuilder {
     /// Adds a material that is opaque and two-sided.
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::material_with`].
     pub fn material(&mut self, material: Material) -> Result<MaterialId, SceneError> {
         self.material_with(material, MaterialOptions::default())
     }
@@ -462,9 +430,6 @@ impl SceneBuilder {
 
     /// Adds a material that is `share` of the second one (the mean of the channels) and the rest of the
     /// first. Their opacities do not count, only that of `options`.
-    ///
-    /// # Errors
-    /// [`SceneError`] if a material is of another builder, or a share is not in 0…1.
     pub fn mixed_material(
         &mut self,
         first: MaterialId,
@@ -478,9 +443,6 @@ impl SceneBuilder {
     /// Adds a material under a coat, as glTF's clearcoat: a `share` of 1 is a coat that reflects as `coat` does,
     /// times Schlick's Fresnel term of an index of refraction of 1.5 at the angle of view; the rest is `base`.
     /// Opacities as in [`SceneBuilder::mixed_material`].
-    ///
-    /// # Errors
-    /// As [`SceneBuilder::mixed_material`].
     pub fn coated_material(
         &mut self,
         base: MaterialId,
@@ -516,9 +478,6 @@ impl SceneBuilder {
     /// Begins an object: the surfaces that are added up to [`SceneBuilder::end_object`] are seen only through its
     /// instances, which share them. They must not shine: a light has a place of its own, so emitters are added
     /// in the scene, for each instance.
-    ///
-    /// # Errors
-    /// [`SceneError::Object`] if an object has begun already.
     pub fn begin_object(&mut self) -> Result<(), SceneError> {
         if self.open_object.is_some() {
             return Err(SceneError::Object("an object in an object"));
@@ -527,10 +486,6 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Ends the object.
-    ///
-    /// # Errors
-    /// [`SceneError::Object`] if none has begun.
     pub fn end_object(&mut self) -> Result<ObjectId, SceneError> {
         let first = self.open_object.take().ok_or(SceneError::Object("the end of no object"))?;
         let surfaces = first..self.parts.surfaces.len() as u32;

@@ -17,7 +17,6 @@ pub struct Environment {
     pub horizon: Rgb,
     /// Radiance from below.
     pub ground: Rgb,
-    /// The sun.
     pub sun: Option<Sun>,
 }
 

@@ -26,7 +26,6 @@ pub(super) struct Cluster {
     pub(super) intensity: f64,
     /// Sum of the areas, as seen along the normals.
     pub(super) area: f32,
-    /// Number of lights.
     pub(super) count: u32,
 }
 

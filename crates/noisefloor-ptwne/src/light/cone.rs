@@ -26,7 +26,6 @@ pub(crate) struct Cone {
 }
 
 impl Cone {
-    /// Contains all directions.
     pub(super) const EVERYWHERE: Self = Self { inner: -2.0, outer: -3.0, falloff: Falloff::Squared };
 
     pub(super) fn new(inner: f32, outer: f32, falloff: Falloff) -> Result<Self, SceneError> {

@@ -27,7 +27,6 @@ pub(crate) enum LightShape {
         frame: Frame,
         one_minus_cos: f32,
     },
-    /// The environment map.
     Map,
     /// A point that shines within a cone around `axis`. Its radiance is its intensity.
     Point {

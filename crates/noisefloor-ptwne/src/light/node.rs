@@ -32,7 +32,6 @@ pub(super) struct Node {
     sin_spread: Vec4,
     cos_emission: Vec4,
     sin_emission: Vec4,
-    /// One or zero.
     two_sided: Vec4,
     /// One for what shines alike in all directions, and has no axis; or zero.
     round: Vec4,

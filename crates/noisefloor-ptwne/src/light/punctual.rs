@@ -96,8 +96,6 @@ fn projector(
 }
 
 impl Light {
-    /// # Errors
-    /// [`SceneError`] if a number is not finite or out of range, or a direction is zero.
     pub(crate) fn punctual(punctual: Punctual) -> Result<Self, SceneError> {
         let (shape, radiance) = match punctual {
             Punctual::Point { position: p, intensity } => {

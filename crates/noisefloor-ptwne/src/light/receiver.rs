@@ -44,7 +44,6 @@ impl Receiver {
         }
     }
 
-    /// A Lambertian surface.
     #[inline]
     pub(crate) fn diffuse(position: Vec3, normal: Vec3) -> Self {
         Self { position, normal, diffuse: 1.0, glossy: 0.0, mirror: normal, alpha2: 1.0, share: FRAC_1_PI }

@@ -11,7 +11,6 @@ use std::ops::Range;
 #[derive(Clone, Debug, Default)]
 pub(super) struct LightTree {
     nodes: Vec<Node>,
-    /// Of each light.
     places: Vec<Place>,
     /// Where the lights of each patch begin in `lights`, and where those of the last end.
     first: Vec<u32>,

@@ -9,18 +9,12 @@ pub(crate) const RELATIVE_MSE_EPSILON: f64 = 0.01;
 /// Mean over pixels and channels of (I − R)²/(R² + ε), ε = 0.01, of linear radiance (Rousselle, Knaus,
 /// Zwicker 2011, §5). Nothing is trimmed: a single firefly can dominate. Expose both pictures alike first, so
 /// that the unit of radiance does not matter.
-///
-/// # Errors
-/// [`MetricError`] if the pictures have different numbers of pixels, or none.
 pub fn relative_mse(image: &[Rgb], reference: &[Rgb]) -> Result<f64, MetricError> {
     mean_of_channels(image, reference, |i, r| (i - r).powi(2) / (r * r + RELATIVE_MSE_EPSILON))
 }
 
 /// Peak signal-to-noise ratio in dB, 10·log₁₀(1/MSE), of display values in [0, 1] over all channels; infinite
 /// for equal pictures.
-///
-/// # Errors
-/// [`MetricError`] if the pictures have different numbers of pixels, or none.
 pub fn psnr(image: &[Rgb], reference: &[Rgb]) -> Result<f64, MetricError> {
     Ok(-10.0 * mean_of_channels(image, reference, |i, r| (i - r).powi(2))?.log10())
 }

@@ -10,9 +10,6 @@ const BUTTERAUGLI_EDGE: usize = 8;
 /// Butteraugli of libjxl, in its port to Rust: a distance at each pixel, at 80 cd/m². Its authors' score is
 /// [`DifferenceMap::max`]; below 1 pictures look the same. As an average they recommend
 /// the 3-norm ([`DifferenceMap::norm`]).
-///
-/// # Errors
-/// [`MetricError`] if sizes do not match, or an edge is below 8 pixels.
 pub fn butteraugli(
     reference: &[Rgb],
     test: &[Rgb],

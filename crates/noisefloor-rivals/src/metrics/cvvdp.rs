@@ -33,9 +33,6 @@ pub fn cvvdp(
 
 /// [`cvvdp`] of single tiles, each compared as a picture of its own: JODs, in the order of `tiles`. Tiles of
 /// fewer than 16 pixels on a side, as at the border of a picture, take pixels of their neighbours in.
-///
-/// # Errors
-/// [`MetricError`] if sizes do not match, or a value is not finite.
 pub fn cvvdp_of_tiles(
     reference: &[Rgb],
     test: &[Rgb],

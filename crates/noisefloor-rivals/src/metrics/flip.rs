@@ -8,9 +8,6 @@ use nv_flip::FlipImageRgb8;
 /// between them, in [0, 1] at each pixel. Its authors report the mean. FLIP's default of `pixels_per_degree`
 /// is 67; the other metrics here use [`crate::VdpViewing::pixels_per_degree`]. Display values are rounded to
 /// 8 bits, as on a screen.
-///
-/// # Errors
-/// [`MetricError`] if sizes do not match, or the resolution is outside 1…1000.
 pub fn flip(
     reference: &[Rgb],
     test: &[Rgb],

@@ -8,7 +8,6 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
 /// Bands of frequency with orientations, beside the base band.
 const DOMS: usize = 5;
-/// Orientations of each.
 const FANS: usize = 6;
 /// Pixels of mirrored picture between its end and its beginning.
 const MARGIN: usize = 32;

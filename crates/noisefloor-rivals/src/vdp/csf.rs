@@ -45,10 +45,6 @@ impl VdpViewing {
         self.distance * 1f64.to_radians().tan() * self.dpi / 0.0254
     }
 
-    /// Checks the values.
-    ///
-    /// # Errors
-    /// [`VdpViewingError`] names the first one that is not positive and finite.
     pub fn check(&self) -> Result<(), VdpViewingError> {
         let numbers = [
             ("distance", self.distance),

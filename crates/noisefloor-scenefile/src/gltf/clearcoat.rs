@@ -6,7 +6,6 @@ use gltf::json::texture::Info;
 use gltf::json::{Value, deserialize};
 use noisefloor_ptwne::{Material, MaterialId, MaterialOptions, SceneBuilder, SceneError, Texture};
 
-/// The extension.
 pub(super) const NAME: &str = "KHR_materials_clearcoat";
 
 /// What the extension says of a coat.
@@ -22,7 +21,6 @@ pub(super) struct Clearcoat {
 #[derive(Debug)]
 pub(super) struct Coat {
     pub(super) share: Texture,
-    /// GGX α.
     pub(super) roughness: f32,
     /// The same by place, if it varies.
     pub(super) alphas: Option<Texture>,

@@ -77,7 +77,6 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// Reads one material.
 struct Reader<'m, 'a> {
     source: &'m Source,
     place: Place,
@@ -87,7 +86,6 @@ struct Reader<'m, 'a> {
     notes: &'m mut Notes,
 }
 
-/// What it reads.
 struct Read {
     material: Material,
     cover: MaterialOptions,

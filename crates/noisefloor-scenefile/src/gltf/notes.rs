@@ -26,7 +26,6 @@ const KNOWN: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Collects warnings.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
     warnings: Vec<Warning>,

@@ -31,7 +31,6 @@ const NO_IMAGE: usize = u32::MAX as usize;
 pub(super) enum Encoding {
     /// Colours, encoded as sRGB.
     Srgb,
-    /// Shares.
     Linear,
 }
 
@@ -53,7 +52,6 @@ struct Decoded {
 pub(super) struct Textures<'a> {
     asset: &'a Asset<'a>,
     images: HashMap<usize, Decoded>,
-    /// By image.
     opacities: HashMap<usize, Codes>,
     /// The set of texture coordinates that comes first in the material that is read.
     pub(super) first_set: u32,

@@ -27,9 +27,6 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
 
 /// As [`parse`], with the colours of an attribute as Mitsuba names it: `vertex_` or `face_` and the name of its
 /// properties without their numbers. One of a single number is grey.
-///
-/// # Errors
-/// As [`parse`]; and if the mesh has no such attribute.
 pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> Result<Triangles, LoadError> {
     let place = Place::file(path);
     let Header { elements, format, length } = Header::read(bytes, path)?;

@@ -20,9 +20,6 @@ impl Cutter {
     /// The triangles of a polygon, as numbers of its corners, which run as those of the polygon. A convex one
     /// is a fan from its first corner; of others, ears are cut off (Meisters 1975). A polygon that crosses
     /// itself is cut as far as that goes.
-    ///
-    /// # Errors
-    /// [`LoadError::TooLarge`] if the polygons so far were too large and too bent.
     pub(crate) fn cut(&mut self, corners: &[[f32; 3]], place: &Place) -> Result<Vec<[usize; 3]>, LoadError> {
         let flat = if corners.len() > 3 { flattened(corners) } else { vec![] };
         let mut left: Vec<usize> = (0..corners.len()).collect();

@@ -16,9 +16,6 @@ const MAX_MIXED: u64 = 256;
 
 impl<'d> Context<'d> {
     /// A `bsdf`.
-    ///
-    /// # Errors
-    /// [`LoadError`] if it is broken, of a kind that is not supported, or in itself.
     pub(super) fn surface(&self, element: &'d Element) -> Result<Surface, LoadError> {
         let serial = element.serial;
         if let Some(known) = self.surfaces.borrow().get(&serial) {

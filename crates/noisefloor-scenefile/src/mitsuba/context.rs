@@ -195,9 +195,6 @@ impl<'d> Context<'d> {
     }
 
     /// Runs `read` for `element`, which may hold others of its kind.
-    ///
-    /// # Errors
-    /// [`LoadError`] if the element holds itself, or if elements nest too deeply by reference.
     pub(super) fn nested_in<T>(
         &self,
         element: &'d Element,
@@ -244,9 +241,6 @@ impl<'d> Context<'d> {
     }
 
     /// Warns of everything that nobody has read.
-    ///
-    /// # Errors
-    /// [`LoadError::Bad`] if something was read that has a parameter without a value.
     pub(super) fn finish(&self) -> Result<(), LoadError> {
         if let Some(element) = self.document.root.read_unset() {
             return Err(self.bad(element, "a parameter has no value"));

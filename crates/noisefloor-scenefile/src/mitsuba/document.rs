@@ -15,12 +15,10 @@ const MAX_XML_BYTES: u64 = 64 << 20;
 const MAX_ELEMENTS: u64 = 1 << 20;
 /// How deep elements may nest, and how deep files may include each other.
 const MAX_DEPTH: u32 = 32;
-/// Most files.
 const MAX_FILES: u64 = 1000;
 /// Longest name of a `$parameter`.
 const MAX_PARAMETER: usize = 64;
 
-/// A scene file.
 #[derive(Debug)]
 pub(super) struct Document {
     /// The scene file, and the files that it includes.
@@ -60,7 +58,6 @@ impl Document {
         Place::part(&self.files[element.origin.file], format_args!("line {}", element.origin.line))
     }
 
-    /// The scene file.
     pub(super) fn path(&self) -> &Path {
         &self.files[0]
     }

@@ -12,7 +12,6 @@ pub(super) struct Surface {
     pub(super) opacity: Option<Texture>,
     /// Whether it is black from behind.
     pub(super) one_sided: bool,
-    /// Its microfacets.
     pub(super) facets: Facets,
     /// α of its microfacets along and across u, instead of the material's number.
     pub(super) alphas: Option<Texture>,
@@ -20,7 +19,6 @@ pub(super) struct Surface {
     pub(super) relief: Option<Relief>,
 }
 
-/// What reflects.
 #[derive(Clone, Debug)]
 pub(super) enum Body {
     Plain(Material),
@@ -115,7 +113,6 @@ impl Surface {
 pub(super) struct Attribute {
     /// With `vertex_` or `face_` in front.
     pub(super) name: String,
-    /// Factor on it.
     pub(super) scale: f64,
 }
 

@@ -463,9 +463,6 @@ impl<'d> Context<'d> {
 
 impl<'d> Context<'d> {
     /// The attribute that the surfaces in an element use, if they use one.
-    ///
-    /// # Errors
-    /// [`LoadError`] if they use several.
     pub(super) fn attribute_of(&self, element: &'d Element) -> Result<Option<Attribute>, LoadError> {
         if let Some(known) = self.attributes.borrow().get(&element.serial) {
             return Ok(known.clone());

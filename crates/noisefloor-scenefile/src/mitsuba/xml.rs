@@ -45,7 +45,6 @@ pub(super) struct Element {
     pub(super) origin: Origin,
     /// Elements are numbered in the order in which they are parsed.
     pub(super) serial: usize,
-    /// Elements in it.
     pub(super) children: Vec<Element>,
     pub(super) attributes: Vec<Attribute>,
     /// A `$parameter` in its attributes that has no value.

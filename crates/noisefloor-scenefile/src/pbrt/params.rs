@@ -16,7 +16,6 @@ pub(super) enum Values {
     Switches(Vec<bool>),
 }
 
-/// A parameter.
 #[derive(Clone, Debug)]
 pub(super) struct Param {
     /// `float`, `rgb`, `texture`, …
@@ -123,7 +122,6 @@ impl Params {
         names.filter_map(|name| Some((name.clone(), all.get(name)?.clone()))).collect()
     }
 
-    /// No parameters.
     pub(super) fn none(place: Place) -> Self {
         Self { place, space: ColourSpace::default(), all: vec![] }
     }
@@ -214,7 +212,6 @@ impl Params {
         }
     }
 
-    /// Three numbers.
     pub(super) fn triple(&self, name: &str) -> Result<Option<glam::DVec3>, LoadError> {
         match self.numbers(name)? {
             None => Ok(None),
@@ -232,7 +229,6 @@ impl Params {
         }
     }
 
-    /// A switch.
     pub(super) fn switch(&self, name: &str, missing: bool) -> Result<bool, LoadError> {
         match self.get(name).map(|p| &*p.values) {
             None => Ok(missing),

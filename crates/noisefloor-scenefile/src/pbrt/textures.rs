@@ -12,11 +12,9 @@ use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Textures by name.
 pub(super) type Named = HashMap<String, Texture>;
 
 impl Reader<'_> {
-    /// Defines a texture.
     pub(super) fn texture(
         &mut self,
         name: &str,

@@ -11,7 +11,6 @@ pub(super) struct Token {
 pub(super) enum Kind {
     /// A directive, a number, `true` or `false`.
     Word(String),
-    /// Between quotes.
     Text(String),
     Open,
     Close,
@@ -30,9 +29,6 @@ impl<'a> Tokens<'a> {
     }
 
     /// The next token, which stays.
-    ///
-    /// # Errors
-    /// The line of a quote that does not end.
     pub(super) fn peek(&mut self) -> Result<Option<&Token>, u32> {
         if self.peeked.is_none() {
             self.peeked = self.read()?;
@@ -40,10 +36,6 @@ impl<'a> Tokens<'a> {
         Ok(self.peeked.as_ref())
     }
 
-    /// The next token.
-    ///
-    /// # Errors
-    /// As [`Self::peek`].
     pub(super) fn next(&mut self) -> Result<Option<Token>, u32> {
         match self.peeked.take() {
             Some(token) => Ok(Some(token)),

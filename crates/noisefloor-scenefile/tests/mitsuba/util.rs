@@ -23,13 +23,11 @@ impl Folder {
         self.0.path()
     }
 
-    /// Adds a file.
     pub(crate) fn with(self, name: &str, bytes: impl AsRef<[u8]>) -> Self {
         std::fs::write(self.path().join(name), bytes).unwrap();
         self
     }
 
-    /// Adds a PNG.
     pub(crate) fn with_png(self, name: &str, width: u32, pixels: &[[u8; 4]]) -> Self {
         let height = pixels.len() as u32 / width;
         let image = image::RgbaImage::from_raw(width, height, pixels.concat()).unwrap();
@@ -37,7 +35,6 @@ impl Folder {
         self
     }
 
-    /// Adds an EXR.
     pub(crate) fn with_exr(self, name: &str, width: usize, pixels: &[Rgb]) -> Self {
         let layers = noisefloor_image::RenderLayers::rgb(width, pixels.len() / width, pixels);
         noisefloor_image::write_exr(self.path().join(name), &layers).unwrap();

@@ -19,7 +19,6 @@ impl Folder {
         self.0.path()
     }
 
-    /// Adds a file.
     pub(crate) fn with(self, name: &str, bytes: impl AsRef<[u8]>) -> Self {
         std::fs::write(self.path().join(name), bytes).unwrap();
         self

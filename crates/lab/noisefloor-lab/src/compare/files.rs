@@ -57,9 +57,6 @@ impl<'a> CurveRow<'a> {
 
 /// Writes what there is of one scene into a folder, which is made: curve.csv, tiles.csv, plots (SVG and
 /// PNG), pictures and crops.
-///
-/// # Errors
-/// [`LabError`] if a file cannot be written.
 pub fn write_scene(
     folder: &Path,
     comparison: &Comparison,
@@ -87,9 +84,6 @@ pub fn write_scene(
 
 /// Writes index.html, runs.csv and runs.json of all scenes. `sections` are those of
 /// [`section`](super::section), `scenes` the number that there will be.
-///
-/// # Errors
-/// [`LabError::Write`] if a file cannot be written.
 pub fn write_page(
     folder: &Path,
     all: &[Comparison],

@@ -58,11 +58,6 @@ const SAVE_EVERY: Duration = Duration::from_secs(30);
 ///
 /// A kept picture of another scene, or of the scene before an edit, is refused unless
 /// [`ReferenceJob::overwrite`] is set.
-///
-/// # Errors
-/// [`LabError`] if the source fails or has too few samples, or a file cannot be read or written;
-/// [`LabError::OtherReference`] if the folder keeps another one;
-/// [`LabError::Cancelled`] once `cancel` is set and what there is has been saved.
 pub fn render_reference(
     source: &mut dyn ProgressiveSource,
     job: &ReferenceJob<'_>,

@@ -9,9 +9,7 @@ use serde::Serialize;
 /// What a criterion took of a scene's run, and what it left: a line of runs.csv.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CriterionRun {
-    /// The scene.
     pub scene: String,
-    /// Who rendered.
     pub source: String,
     /// The criterion as it was asked for: `cycles:0.01`.
     pub criterion: String,
@@ -35,7 +33,6 @@ pub struct CriterionRun {
     pub rel_mse: f64,
     /// In dB.
     pub psnr: f64,
-    /// Mean.
     pub flip: f64,
     /// Of the worst tile.
     pub flip_worst: f64,
@@ -103,7 +100,6 @@ pub struct CurvePoint {
 /// Where a criterion stopped a tile, and how that tile looks: a line of tiles.csv.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TileStop {
-    /// The scene.
     pub scene: String,
     /// The criterion as it was asked for.
     pub criterion: String,
@@ -113,18 +109,14 @@ pub struct TileStop {
     pub x: usize,
     /// Top edge in pixels.
     pub y: usize,
-    /// Samples per pixel.
     pub spp: u64,
-    /// Mean FLIP error.
     pub flip: f64,
 }
 
 /// What came of the criteria on one scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The scene.
     pub scene: String,
-    /// Who rendered.
     pub source: String,
     /// Width and height in pixels.
     pub size: (usize, usize),
@@ -145,7 +137,6 @@ pub struct Comparison {
 /// What a comparison is called.
 #[derive(Clone, Debug)]
 pub struct Labels {
-    /// The scene.
     pub scene: String,
     /// Where the converged picture comes from, for people.
     pub reference: String,

@@ -78,9 +78,6 @@ fn summary(all: &[Comparison]) -> String {
 }
 
 /// All about one scene, as HTML. `plots` are drawn with a [`Cost`] each.
-///
-/// # Errors
-/// [`LabError::Plot`] if a picture cannot be encoded.
 pub fn section(
     comparison: &Comparison,
     pictures: &Pictures,

@@ -24,14 +24,12 @@ pub struct Crop {
     pub name: &'static str,
     /// What it shows, for people.
     pub caption: String,
-    /// The sheet.
     pub sheet: Canvas,
 }
 
 /// What there is to see of a comparison.
 #[derive(Clone, Debug)]
 pub struct Pictures {
-    /// The converged picture.
     pub reference: Canvas,
     /// Each criterion as it was asked for, and its picture.
     pub criteria: Vec<(String, Canvas)>,

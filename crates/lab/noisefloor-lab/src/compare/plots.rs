@@ -12,14 +12,12 @@ use plotters::prelude::*;
 /// What a plot counts on its horizontal axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {
-    /// Samples per pixel.
     Samples,
     /// Seconds, of the source and the criterion together.
     Seconds,
 }
 
 impl Cost {
-    /// Both.
     pub const ALL: [Self; 2] = [Self::Samples, Self::Seconds];
 
     /// For file names.
@@ -55,16 +53,11 @@ impl Cost {
 /// A plot in two formats.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// As SVG.
     pub svg: String,
-    /// As pixels.
     pub canvas: Canvas,
 }
 
 /// Plots error against cost: uniform sampling as a curve, each criterion as a sign where it stopped.
-///
-/// # Errors
-/// [`LabError::Plot`] if nothing can be drawn.
 pub fn plot(comparison: &Comparison, cost: Cost) -> Result<Plot, LabError> {
     let panels = MEASURES.map(|measure| Panel::new(comparison, cost, measure));
     let svg = svg(SIZE, |root| draw(root, cost.label(), &panels))?;

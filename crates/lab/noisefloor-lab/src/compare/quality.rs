@@ -33,11 +33,8 @@ pub struct Quality {
     pub cvvdp_jod_worst: f64,
 }
 
-/// Whose eyes.
 pub(super) struct Eye {
-    /// For FLIP.
     pub(super) pixels_per_degree: f64,
-    /// For ColorVideoVDP.
     pub(super) vision: VisionModel,
 }
 
@@ -64,9 +61,6 @@ fn mean(values: &mut dyn Iterator<Item = f32>) -> f64 {
 
 impl Yardstick {
     /// `reference` is linear radiance, row-major over the image of `grid`.
-    ///
-    /// # Errors
-    /// [`LabError::Tile`] if the picture has more blocks than a grid has tiles.
     pub(super) fn new(
         grid: TileGrid,
         display: Display,

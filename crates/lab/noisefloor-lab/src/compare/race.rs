@@ -36,9 +36,6 @@ impl Entrant {
     /// A criterion that is about to watch a run of that size. `spec` is how it was asked for.
     ///
     /// With verdicts that are [spaced](Schedule::Spaced) for each tile by its need, it does not watch: it renders as a driver would, from the same source.
-    ///
-    /// # Errors
-    /// [`LabError::Session`] if the parameters are out of range.
     pub fn new(
         spec: String,
         criterion: Box<dyn StoppingCriterion + Send>,
@@ -159,9 +156,7 @@ pub(super) struct Course<'a> {
     pub(super) step: u64,
     /// The converged picture: linear radiance, row-major.
     pub(super) truth: &'a [Rgb],
-    /// For FLIP.
     pub(super) pixels_per_degree: f64,
-    /// For ColorVideoVDP.
     pub(super) vision: VisionModel,
     pub(super) cancel: &'a AtomicBool,
     pub(super) watch: Watch<'a>,

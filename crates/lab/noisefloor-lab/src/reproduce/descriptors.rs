@@ -16,7 +16,6 @@ pub(super) fn luminance_pair(edge: usize) -> Descriptor {
     Descriptor::new(PixelPair { mask: None, edge })
 }
 
-/// Both descriptors.
 #[derive(Debug)]
 struct PixelPair {
     mask: Option<NoiseMask>,

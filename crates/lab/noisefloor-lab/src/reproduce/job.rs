@@ -10,10 +10,8 @@ use noisefloor_learn::{Corpora, describe_pairs};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// What is reproduced.
 #[derive(Clone, Debug)]
 pub struct Reproduction {
-    /// Corpus folders.
     pub corpus: Vec<PathBuf>,
     /// Edge of the tiles in pixels: each is the centre of its zone.
     pub edge: usize,

@@ -40,9 +40,7 @@ pub struct Fingerprint {
     pub scaling: PairScaling,
     /// Which pairs are asked about.
     pub protocol: PairProtocol,
-    /// C and γ.
     pub params: SvmParams,
-    /// Of this crate.
     pub version: String,
 }
 
@@ -109,11 +107,9 @@ impl Sum for Count {
 pub struct MachineResult {
     /// What it is asked about, in words.
     pub asked: String,
-    /// Pairs learned.
     pub examples: usize,
     /// Of them, support vectors.
     pub support_vectors: usize,
-    /// From distances.
     pub seconds_training: f64,
     /// Synthesised pairs asked about.
     pub synthesised: Count,
@@ -124,7 +120,6 @@ pub struct MachineResult {
 /// What it costs to ask a machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct QueryCost {
-    /// Median, one thread.
     pub seconds: f64,
     /// Support vectors and coefficients as `f32`.
     pub model_bytes: usize,

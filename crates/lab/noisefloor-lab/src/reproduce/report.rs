@@ -5,12 +5,10 @@ use super::outcome::{Count, MachineResult, ProtocolOutcome, QueryCost};
 use super::protocol::PairProtocol;
 use serde::Serialize;
 
-/// All results together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReproductionReport {
     /// Zones' edge in pixels.
     pub edge: usize,
-    /// Levels a zone.
     pub levels: usize,
     /// What to know before reading a number.
     pub notes: Vec<String>,
@@ -49,7 +47,6 @@ impl ReproductionReport {
         Self { edge: job.edge, levels: job.levels, notes, outcomes }
     }
 
-    /// Tables for reading.
     pub fn markdown(&self) -> String {
         let learned = self.outcomes.iter().flat_map(|o| &o.machines).map(|m| m.examples).max().unwrap_or(0);
         let mut text = format!("{learned} pairs of {e}×{e} pixels, C = 2, γ = 2.\n\n", e = self.edge);

@@ -31,9 +31,6 @@ pub(super) struct Weights {
 
 /// Trains on examples whose squared distances are given, n×n and symmetric; `converged[i]` is the class of
 /// example i.
-///
-/// # Errors
-/// [`SvmTrainError`] if parameters or examples are out of range.
 pub(super) fn fit_weights(
     squared: ArrayView2<'_, f64>,
     converged: &[bool],
@@ -53,9 +50,6 @@ pub(super) fn fit_weights(
 }
 
 /// A machine that has learned rows, one an example.
-///
-/// # Errors
-/// As of [`fit_weights`].
 pub(super) fn fit_rows(
     rows: ArrayView2<'_, f64>,
     converged: &[bool],

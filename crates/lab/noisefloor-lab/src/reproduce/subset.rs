@@ -17,21 +17,16 @@ use std::time::Instant;
 /// Pairs, and a machine that has learned the first half of them.
 #[derive(Clone, Debug, Serialize)]
 pub struct PairSubset {
-    /// C and γ.
     pub params: SvmParams,
     /// Rows that were learned, counted from the first; the others were not.
     pub learned: usize,
     /// Of each row: whether the pair is identical.
     pub identical: Vec<bool>,
-    /// Of each row.
     pub decisions: Vec<f32>,
-    /// Of the machine.
     pub support_vectors: usize,
-    /// To train it.
     pub seconds_training: f64,
     /// To ask it about one row.
     pub seconds_query: f64,
-    /// Threads that worked.
     pub threads: usize,
     /// The pairs: a row each.
     #[serde(skip)]
@@ -39,9 +34,6 @@ pub struct PairSubset {
 }
 
 /// Learns `count` of the synthesised pairs of noise masks and asks about as many others, both spread evenly.
-///
-/// # Errors
-/// [`LabError`] if a corpus cannot be read, or has too few pairs or groups of scenes.
 pub fn subset(job: &Reproduction, count: usize, watch: Watch<'_>) -> Result<PairSubset, LabError> {
     learn(&job.load(&job.masks(), watch)?.into_pairs()?, count)
 }
@@ -81,9 +73,6 @@ fn learn(pairs: &Pairs, count: usize) -> Result<PairSubset, LabError> {
 }
 
 /// Writes rows.npy and machine.json into the folder, which is made.
-///
-/// # Errors
-/// [`LabError`] if a file cannot be written.
 pub fn write_subset(folder: &Path, subset: &PairSubset) -> Result<(), LabError> {
     make_folder(folder)?;
     write_atomic(folder.join("rows.npy"), |to| write_npy(subset.rows.view(), to))?;

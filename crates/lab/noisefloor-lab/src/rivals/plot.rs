@@ -11,9 +11,6 @@ use plotters::prelude::*;
 const LEGEND: (i32, i32) = (758, 40);
 
 /// Draws mean thresholds as SVG, scene by scene: people, the model, and each rival.
-///
-/// # Errors
-/// [`LabError::Plot`] if nothing can be drawn.
 pub fn plot_scene_means(model: &[Prediction], rated: &[RatedRival]) -> Result<String, LabError> {
     let (scenes, series) = series(model, rated);
     svg((900, 480), |root| draw(root, &scenes, &series))

@@ -11,7 +11,6 @@ pub enum CorpusError {
     /// `thresholds.csv` cannot be read.
     #[error("{}: cannot be read: {source}; a corpus is a folder with thresholds.csv and its stacks", path.display())]
     Io {
-        /// The table.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
@@ -19,7 +18,6 @@ pub enum CorpusError {
     /// A line of `thresholds.csv` is malformed.
     #[error("{}, line {line}: {what}; the columns are scene,renderer,zone,x,y,width,height,human_spp,first_spp,last_spp", path.display())]
     Row {
-        /// The table.
         path: PathBuf,
         /// Line, from 1.
         line: u64,
@@ -29,11 +27,8 @@ pub enum CorpusError {
     /// No images for a zone.
     #[error("{}: zone {zone} of {scene} has no images: neither folder {} nor {} is there; add one of them", dir.display(), of_scene.display(), of_zone.display())]
     NoImages {
-        /// The corpus.
         dir: PathBuf,
-        /// The scene.
         scene: String,
-        /// The zone.
         zone: u32,
         /// Where running means of the scene would be.
         of_scene: PathBuf,
@@ -42,14 +37,7 @@ pub enum CorpusError {
     },
     /// Several scenes share one set of zone folders.
     #[error("{}: zone folders hold one scene, but thresholds.csv names {one} and {other}; give each a folder of its own", dir.display())]
-    Scenes {
-        /// The corpus.
-        dir: PathBuf,
-        /// One scene.
-        one: String,
-        /// Another.
-        other: String,
-    },
+    Scenes { dir: PathBuf, one: String, other: String },
     /// The corpus has no such scene.
     #[error("no scene {scene} in this corpus; it has {known}")]
     Unknown {
@@ -61,11 +49,8 @@ pub enum CorpusError {
     /// A zone is not inside its image.
     #[error("{}: zone {zone} of {scene} is not inside the {width}×{height} image; correct thresholds.csv", path.display())]
     Zone {
-        /// The image.
         path: PathBuf,
-        /// The scene.
         scene: String,
-        /// The zone.
         zone: u32,
         /// The image's width in pixels.
         width: usize,

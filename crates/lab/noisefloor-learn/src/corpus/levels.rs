@@ -21,13 +21,9 @@ pub enum Encoding {
 /// The zone inside a patch, in pixels of the patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inner {
-    /// Left edge.
     pub x: usize,
-    /// Top edge.
     pub y: usize,
-    /// Width.
     pub width: usize,
-    /// Height.
     pub height: usize,
 }
 
@@ -40,7 +36,6 @@ pub struct Patch {
     pub height: usize,
     /// Row-major, `width * height` values.
     pub pixels: Vec<Rgb>,
-    /// The zone itself.
     pub inner: Inner,
 }
 
@@ -55,7 +50,6 @@ impl Patch {
 /// One real image of one zone: the mean of its samples `first`+1…`last`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JudgedImage {
-    /// Scene name.
     pub scene: String,
     /// The zone's number in the scene.
     pub zone: u32,
@@ -67,7 +61,6 @@ pub struct JudgedImage {
     pub encoding: Encoding,
     /// Variance of the rounding of each value; see [`Picture::rounding`].
     pub rounding: f32,
-    /// The pixels.
     pub patch: Patch,
 }
 
@@ -93,9 +86,6 @@ struct Job<'a> {
 /// Every real image of one zone, samples ascending. For all zones of a scene,
 /// [`Corpus::scene_levels`](crate::Corpus::scene_levels) decodes each shared image once instead of once a
 /// zone.
-///
-/// # Errors
-/// [`CorpusError::Stack`] if the zone's folder cannot be listed.
 pub fn zone_levels(zone: &JudgedZone) -> Result<JudgedImages<'_>, CorpusError> {
     JudgedImages::of(&[zone])
 }

@@ -16,7 +16,6 @@ const MAX_TABLE_BYTES: u64 = 16 << 20;
 const COLUMNS: [&str; 10] =
     ["scene", "renderer", "zone", "x", "y", "width", "height", "human_spp", "first_spp", "last_spp"];
 
-/// One checked line.
 pub(super) struct Row {
     pub(super) scene: String,
     renderer: String,

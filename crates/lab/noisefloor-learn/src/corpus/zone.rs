@@ -17,7 +17,6 @@ pub enum ZoneImages {
 /// One zone of a scene, and the threshold observers gave for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JudgedZone {
-    /// Scene name.
     pub scene: String,
     /// Who rendered the images.
     pub renderer: String,
@@ -27,9 +26,7 @@ pub struct JudgedZone {
     pub x: usize,
     /// Top edge in the full picture, in pixels.
     pub y: usize,
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     /// Mean samples per pixel at which observers could no longer tell the zone from the reference; positive.
     pub human_spp: f64,

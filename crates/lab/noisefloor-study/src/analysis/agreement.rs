@@ -8,7 +8,6 @@ use serde::Serialize;
 /// Agreement of observers with themselves, over the first two showings of each tile.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RepeatAgreement {
-    /// Pairs of showings.
     pub pairs: usize,
     /// exp(median |ln ratio|) of the two thresholds: 1 if they are equal.
     pub factor: f64,
@@ -23,7 +22,6 @@ pub struct RepeatAgreement {
 pub struct BetweenObservers {
     /// Observers with a threshold for every tile.
     pub observers: usize,
-    /// Tiles.
     pub tiles: usize,
     /// Intraclass correlation ICC(2,1) of ln(threshold) (Shrout and Fleiss 1979): the share of variance due
     /// to tiles, for one observer.

@@ -66,9 +66,6 @@ struct ClassLine {
 /// `classes.csv`, plots, `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes. Loops are not part
 /// of that: models are trained on stills, and their thresholds are those of films. What was there is
 /// replaced.
-///
-/// # Errors
-/// [`StudyError`] if a file cannot be written, or a picture not be read.
 pub fn write(
     dir: &Path,
     study: &Study,

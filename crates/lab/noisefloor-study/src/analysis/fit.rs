@@ -107,7 +107,6 @@ impl Hypothesis {
 /// An estimate with the interval that holds 95 % of the posterior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate {
-    /// Posterior median.
     pub(super) value: f64,
     /// 2.5 % and 97.5 % of the posterior.
     pub(super) interval: [f64; 2],

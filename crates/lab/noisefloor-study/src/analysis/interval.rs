@@ -11,9 +11,7 @@ pub(super) const RESAMPLES: usize = 1000;
 /// A share of answers with its 95 % interval (Wilson 1927; Brown, Cai and DasGupta 2001, eq. 4).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Share {
-    /// Positive answers.
     pub yes: usize,
-    /// All answers.
     pub of: usize,
     /// `yes / of`.
     pub share: f64,

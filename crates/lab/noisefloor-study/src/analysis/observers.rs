@@ -16,7 +16,6 @@ pub type TileKey = (u32, u32);
 /// The answers of one observer.
 #[derive(Clone, Debug)]
 pub struct Observer {
-    /// The participant's code.
     pub code: String,
     /// Group; empty if the study has none.
     pub group: String,
@@ -24,7 +23,6 @@ pub struct Observer {
     pub ids: BTreeMap<String, String>,
     /// How far the observer has come.
     pub stage: Stage,
-    /// Viewing conditions.
     pub conditions: Option<Conditions>,
     /// Which of them the study does not accept.
     pub viewing_problem: Option<ViewingProblem>,
@@ -117,9 +115,6 @@ pub fn places(study: &Study) -> Vec<TileKey> {
 }
 
 /// Replays stored sessions, skipping those without an answer that counts.
-///
-/// # Errors
-/// [`StudyError::Store`] if an event does not fit the study.
 pub fn replay_all(study: &Arc<Study>, records: &[SessionRecord]) -> Result<Vec<Observer>, StudyError> {
     let grids = grids(study);
     let mut observers = Vec::with_capacity(records.len());

@@ -80,9 +80,6 @@ pub const DICTIONARY: [(&str, &str); 25] = [
 ];
 
 /// All responses of some sessions, in order.
-///
-/// # Errors
-/// [`StoreError::Event`] if an event does not fit the study.
 pub fn responses(study: &Arc<Study>, records: &[SessionRecord]) -> Result<Vec<ResponseRow>, StoreError> {
     let grids = grids(study);
     let mut rows = Vec::new();
@@ -200,9 +197,6 @@ impl ResponseRow {
 
 /// Writes the folder: `responses.csv` with all responses, and for BIDS `dataset_description.json`,
 /// `participants.tsv` and its dictionary, and a table of responses per participant under `sub-NNN/beh`.
-///
-/// # Errors
-/// [`StudyError`] if a file cannot be written.
 pub fn write_raw(
     dir: &Path,
     study: &Arc<Study>,

@@ -53,9 +53,6 @@ pub struct StudyReport {
 }
 
 /// Analyses all stored answers of a study.
-///
-/// # Errors
-/// [`StudyError`] if the answers cannot be read, or there are none.
 pub fn analyse(study: &Arc<Study>, options: AnalysisOptions) -> Result<StudyReport, StudyError> {
     let mut records = read_all(&study.database, &study.design())?;
     records.retain(|record| record.simulated == options.simulated);
@@ -94,9 +91,7 @@ pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -
 /// One column of the table.
 #[derive(Clone, Debug, Serialize)]
 pub struct ClassRow {
-    /// What was shown.
     pub class: Class,
-    /// Answers "identical".
     #[serde(flatten)]
     pub identical: Share,
     /// 95 % interval over observers: wider than Wilson's where answers of one observer are alike.
@@ -135,7 +130,6 @@ pub struct GroupLine {
     pub from: String,
     /// The group that T′ stands for.
     pub to: String,
-    /// Observers of each.
     pub observers: [usize; 2],
     /// Tiles that both gave thresholds for.
     pub tiles: usize,
@@ -196,9 +190,7 @@ fn least_squares(pairs: &[(f64, f64)]) -> Option<Audience> {
 /// One row per observer.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObserverRow {
-    /// The participant's code.
     pub code: String,
-    /// Group.
     pub group: String,
     /// Whether all trials were answered.
     pub finished: bool,
@@ -206,9 +198,7 @@ pub struct ObserverRow {
     pub clicks: u64,
     /// Tiles with a threshold.
     pub tiles: usize,
-    /// Catch trials answered.
     pub catch_trials: usize,
-    /// Catch trials failed.
     pub catch_errors: usize,
     /// Ratio of this observer's thresholds to the median of the others' (median over tiles).
     pub sensitivity: Option<f64>,

@@ -30,7 +30,6 @@ pub struct PeopleSpread {
     pub stack: Option<String>,
     /// Observers who saw all these tiles twice.
     pub observers: usize,
-    /// Tiles that count.
     pub tiles: usize,
     /// Tiles left out, since the stack has no room around their median.
     pub left_out: usize,

@@ -36,9 +36,7 @@ pub struct TileRow {
     pub x: usize,
     /// Top edge in pixels.
     pub y: usize,
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     /// Observers with a threshold for this tile.
     pub observers: usize,

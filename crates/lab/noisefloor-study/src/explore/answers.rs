@@ -41,7 +41,6 @@ pub struct TileAnswer {
     pub name: String,
     /// Name of the scene. Pictures of one scene are held out together.
     pub scene: String,
-    /// Samples per pixel.
     pub spp: f64,
     /// The tile: x, y, width and height in pixels.
     pub tile: [usize; 4],
@@ -61,7 +60,6 @@ pub struct TileAnswer {
     pub descriptor_version: u16,
     /// What the tile was compared with.
     pub evidence: Evidence,
-    /// The raw descriptor.
     pub numbers: Vec<f32>,
 }
 
@@ -72,7 +70,6 @@ pub struct Disagreement {
     pub id: i64,
     /// Time of storage, in milliseconds since 1970.
     pub at_ms: u64,
-    /// What was said.
     #[serde(flatten)]
     pub said: TileAnswer,
 }
@@ -100,10 +97,6 @@ pub struct Disagreements {
 
 impl Disagreements {
     /// Opens the database, creating it if needed.
-    ///
-    /// # Errors
-    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::NotDisagreements`] if it holds
-    /// something else.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, StoreError> {
         let path = path.as_ref().to_owned();
         let failed = |source| StoreError::Database { path: path.clone(), source };
@@ -123,9 +116,6 @@ impl Disagreements {
 
     /// Stores an answer, replacing an earlier one about the same tile. It is on disk when this returns.
     /// Returns the row number, and the earlier answer, if any.
-    ///
-    /// # Errors
-    /// [`StoreError::Database`].
     pub fn keep(&self, said: &TileAnswer) -> Result<(i64, Option<bool>), StoreError> {
         let text = |value: serde_json::Result<String>| value.unwrap_or_default();
         let [x, y, width, height] = said.tile;
@@ -166,9 +156,6 @@ impl Disagreements {
     }
 
     /// Sets the scene of all answers about these pictures, whatever it was called when they were given.
-    ///
-    /// # Errors
-    /// [`StoreError::Database`].
     pub(crate) fn name_scene(&self, pictures: &[String], scene: &str) -> Result<(), StoreError> {
         let connection = self.connection();
         let failed = |source| self.failed(source);
@@ -181,18 +168,12 @@ impl Disagreements {
     }
 
     /// Deletes an answer; returns false if it does not exist.
-    ///
-    /// # Errors
-    /// [`StoreError::Database`].
     pub(crate) fn take_back(&self, id: i64) -> Result<bool, StoreError> {
         let deleted = self.connection().execute("DELETE FROM disagreements WHERE id = ?1", [id]);
         deleted.map(|n| n > 0).map_err(|source| self.failed(source))
     }
 
     /// All answers, oldest first.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the database cannot be read.
     pub fn all(&self) -> Result<Vec<Disagreement>, StoreError> {
         read(&self.connection(), &self.path)
     }
@@ -207,9 +188,6 @@ impl Disagreements {
 }
 
 /// All disagreements of a database, oldest first. The database may be in use.
-///
-/// # Errors
-/// [`StoreError`] if it is not there, or holds something else.
 pub fn read_answers(path: impl AsRef<Path>) -> Result<Vec<Disagreement>, StoreError> {
     let path = path.as_ref();
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;

@@ -22,7 +22,6 @@ pub struct ExploreSetup {
     pub viewing: Viewing,
     /// Initial tile edge in pixels, 16…512.
     pub tile: usize,
-    /// Database of disagreements.
     pub database: PathBuf,
     /// Human thresholds for retraining; without them the page cannot retrain.
     pub table: Option<Table>,

@@ -72,10 +72,6 @@ pub(crate) struct PictureView {
 impl GalleryPicture {
     /// Reads a PNG, EXR or PFM file, of an EXR the named layer if it has it. An EXR may state its samples per pixel, as those of `noisefloor render`
     /// do; otherwise its name may: `00100.png`, `kitchen-64spp.exr`.
-    ///
-    /// # Errors
-    /// [`StudyError::Picture`] if the file is not a picture, broken or too large; [`StudyError::NotFinite`]
-    /// if a pixel is not finite.
     pub fn read(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Self, StudyError> {
         let path = path.as_ref();
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());

@@ -8,7 +8,6 @@ use serde::Serialize;
 /// Number of answers that models agree with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct AnswerAgreement {
-    /// Number of answers.
     pub of: usize,
     /// Agreements of the model trained only on the table.
     pub before: usize,
@@ -40,9 +39,7 @@ pub struct Learned {
 /// Progress of the work.
 #[derive(Clone, Debug, Serialize)]
 pub struct LearnStep {
-    /// Steps done.
     pub done: usize,
-    /// Steps in total.
     pub of: usize,
     /// The step that starts now.
     pub doing: String,
@@ -51,9 +48,6 @@ pub struct LearnStep {
 /// Trains on a table together with answers, and scores both. Half of the work is skipped if `model` was
 /// trained on this table and holds its scores. An answer agrees if the verdict for that share of people is the
 /// same. Deterministic.
-///
-/// # Errors
-/// [`TrainError`] if training fails.
 pub fn retrain(
     table: &Table,
     answers: Vec<Answer>,

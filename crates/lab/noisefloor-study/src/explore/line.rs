@@ -25,11 +25,9 @@ const FACTORS: (i32, f64) = (36, 0.1);
 /// What was learned about one person.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PersonalLine {
-    /// Slope a.
     pub slope: f64,
     /// Offset b, in samples per pixel.
     pub offset: f64,
-    /// Answers.
     pub answers: usize,
     /// Answers that the verdicts of the model agree with.
     pub agreed_before: usize,

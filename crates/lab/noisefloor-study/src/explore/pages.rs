@@ -22,7 +22,6 @@ const FILES: [PageFile; 10] = [
     ("explore.css", STYLE, include_str!("../../pages/explore/explore.css")),
 ];
 
-/// The page.
 pub(crate) async fn page() -> Response {
     ([(CONTENT_TYPE, HTML)], PAGE).into_response()
 }

@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A described picture.
 #[derive(Debug)]
 pub(crate) struct Tiles {
     pub(crate) grid: TileGrid,

@@ -32,11 +32,9 @@ pub struct Overview {
 /// One session, as the experimenter sees it.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct OverviewRow {
-    /// The participant's code.
     pub code: String,
     /// Identifiers from the address.
     pub ids: BTreeMap<String, String>,
-    /// Group of observers.
     pub group: String,
     /// `active`, `idle`, `paused`, `dropped-out`, `screened-out` or `finished`.
     pub state: String,

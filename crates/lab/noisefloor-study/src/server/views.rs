@@ -40,16 +40,13 @@ pub struct StudyView {
 pub struct LanguageView {
     /// Name of the language, in the language.
     pub name: String,
-    /// Direction of writing.
     pub direction: Direction,
 }
 
 /// The shape of a stack.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StackView {
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     /// Edge of the tiles in pixels.
     pub tile: usize,
@@ -98,7 +95,6 @@ impl StudyView {
 /// Where a session is.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct SessionView {
-    /// The participant's code.
     pub code: String,
     /// Number of the next event.
     pub next_seq: u64,
@@ -106,9 +102,7 @@ pub struct SessionView {
     pub stage: Stage,
     /// Whether the observer has paused.
     pub paused: bool,
-    /// Trials answered.
     pub done: u32,
-    /// Trials in total.
     pub total: u32,
     /// Number of the trial among those of practice or of data, from 1, and how many there are.
     pub ordinal: (u32, u32),
@@ -183,7 +177,6 @@ fn completion(session: &ParticipantSession) -> Option<CompletionView> {
     }
 }
 
-/// Begins a session.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Beginning {
@@ -192,7 +185,6 @@ pub struct Beginning {
     /// Whether this is a simulated observer, whose answers are kept apart.
     #[serde(default)]
     pub simulated: bool,
-    /// The one-time link.
     #[serde(default)]
     pub link: Option<String>,
     /// Opaque identifiers from the address, by parameter.

@@ -26,7 +26,6 @@ pub(super) struct PlannedTrial {
     pub(super) role: TrialRole,
 }
 
-/// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum Task {

@@ -28,7 +28,6 @@ pub struct EventMisfit(pub String);
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Stage {
-    /// Consent is missing.
     Consent,
     /// The questions of the study are open.
     Questions,
@@ -42,14 +41,12 @@ pub enum Stage {
     ScreenedOut,
 }
 
-/// Rounds of practice.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Practice {
     /// Trials of the current round.
     pub(super) first: u32,
     /// The first trial after it.
     pub(super) end: u32,
-    /// Rounds begun.
     pub(super) rounds: u32,
     /// Trials passed in the current round.
     passed: u32,
@@ -102,7 +99,6 @@ pub struct ParticipantSession {
     pub(super) problem: Option<ViewingProblem>,
     pub(super) language: Option<String>,
     pub(super) answers: BTreeMap<String, String>,
-    /// Trials answered.
     pub(super) at: u32,
     /// `None` after the last trial.
     pub(super) shown: Option<Shown>,
@@ -155,10 +151,6 @@ impl ParticipantSession {
         Self { simulated, ..self }
     }
 
-    /// Applies an event.
-    ///
-    /// # Errors
-    /// [`EventMisfit`] if the event is impossible in this state, which is then unchanged.
     pub fn apply(&mut self, event: &StudyEvent) -> Result<(), EventMisfit> {
         match event {
             StudyEvent::Pause if self.paused => return misfit("the session is paused already"),
@@ -394,7 +386,6 @@ impl ParticipantSession {
 // What can be read from the state of a session.
 
 impl ParticipantSession {
-    /// The study.
     pub fn study(&self) -> &Arc<Study> {
         &self.study
     }
@@ -514,9 +505,6 @@ impl ParticipantSession {
 // A session rebuilt from its events.
 
 /// Replays a session from the database.
-///
-/// # Errors
-/// [`StoreError::Plan`] if its trials are not of this study, [`StoreError::Event`] if an event does not fit.
 pub fn replay(
     study: Arc<Study>,
     grids: Arc<Vec<Arc<QuestGrid>>>,

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
-    /// Two references.
     Reference,
     /// A reference, and the picture assembled from where tiles stopped.
     Test,
@@ -30,9 +29,7 @@ pub enum CatchKind {
 pub enum TrialRole {
     /// Practice, which has to be passed.
     Practice,
-    /// Data.
     Data,
-    /// A catch trial.
     Catch(CatchKind),
 }
 
@@ -46,7 +43,6 @@ pub enum Trial {
         number: u32,
         /// Whether it is practice.
         practice: bool,
-        /// The stack.
         stack: u32,
         /// Level of each tile.
         levels: Vec<u32>,
@@ -59,7 +55,6 @@ pub enum Trial {
         number: u32,
         /// Whether it is practice.
         practice: bool,
-        /// The stack.
         stack: u32,
         /// Level of each tile of the left picture.
         left: Vec<u32>,
@@ -72,9 +67,7 @@ pub enum Trial {
         number: u32,
         /// Whether it is practice.
         practice: bool,
-        /// The stack.
         stack: u32,
-        /// The tile.
         tile: u32,
         /// Its level in the first interval. All other tiles are those of the reference.
         first: u32,
@@ -88,38 +81,27 @@ pub enum Trial {
 pub enum TrialOutcome {
     /// Acquisition: where the observer left each tile.
     Stops {
-        /// The stack.
         stack: u32,
         /// Which showing of it, from 0.
         repeat: u32,
         /// Level of each tile.
         levels: Vec<u32>,
-        /// Clicks.
         clicks: u64,
     },
-    /// Validation.
     Judged {
-        /// The stack.
         stack: u32,
-        /// What was shown.
         class: Class,
         /// Whether it was called identical.
         identical: bool,
     },
-    /// Forced choice.
     Chosen {
-        /// The stack.
         stack: u32,
-        /// The tile.
         tile: u32,
-        /// Its level.
         level: u32,
         /// Whether the noise was found.
         right: bool,
     },
-    /// A catch trial.
     Caught {
-        /// Its kind.
         kind: CatchKind,
         /// Whether it was answered correctly.
         passed: bool,

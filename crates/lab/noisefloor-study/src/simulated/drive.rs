@@ -14,18 +14,11 @@ use thiserror::Error;
 pub enum DriveError {
     /// The server did not answer.
     #[error("{url}: no answer: {source}; is `noisefloor-lab study serve` running there?")]
-    Http {
-        /// The address requested.
-        url: String,
-        /// What went wrong.
-        source: Box<ureq::Error>,
-    },
-    /// The server refused.
+    Http { url: String, source: Box<ureq::Error> },
     #[error("{url}: refused with status {status}: {body}")]
     Refused {
         /// What was asked for.
         url: String,
-        /// HTTP status.
         status: u16,
         /// What the server said.
         body: String,
@@ -67,9 +60,6 @@ fn json(value: &impl Serialize) -> String {
 
 /// Takes a simulated observer through a whole session on a server, `http://host:port`. The group must be
 /// one of the study's. `on_event` receives the time each event took to be acknowledged. Returns the code.
-///
-/// # Errors
-/// [`DriveError`] if the server does not answer or refuses.
 pub fn drive(
     server: &str,
     group: &str,
@@ -109,9 +99,6 @@ pub fn drive(
 }
 
 /// Takes a simulated observer through a whole session without a server.
-///
-/// # Errors
-/// [`EventMisfit`] if an answer does not fit, which would be a mistake of the observer.
 pub fn run(session: &mut ParticipantSession, observer: &mut SimulatedObserver) -> Result<(), EventMisfit> {
     let stacks: Vec<StackView> = session.study().stacks.iter().map(StackView::of).collect();
     let language = session.study().text.keys().next().cloned().unwrap_or_default();

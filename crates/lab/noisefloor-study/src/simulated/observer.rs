@@ -83,7 +83,6 @@ pub enum Behaviour {
     RandomClicker,
 }
 
-/// One simulated observer.
 #[derive(Clone, Debug)]
 pub struct SimulatedObserver {
     /// This observer's ln(threshold), by stack and tile.

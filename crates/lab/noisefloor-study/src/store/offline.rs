@@ -9,9 +9,6 @@ use rusqlite::TransactionBehavior;
 use std::path::Path;
 
 /// Reads all sessions, in the order they began. The database may be in use by a server.
-///
-/// # Errors
-/// [`StoreError`] if it is not there or belongs to another study.
 pub fn read_all(path: impl AsRef<Path>, design: &str) -> Result<Vec<SessionRecord>, StoreError> {
     let path = path.as_ref();
     let connection = open_existing(path, design)?;
@@ -21,9 +18,6 @@ pub fn read_all(path: impl AsRef<Path>, design: &str) -> Result<Vec<SessionRecor
 }
 
 /// Adds one-time links to the database of a study, creating it if needed. Returns their tokens.
-///
-/// # Errors
-/// [`StoreError`] if the database cannot be written or belongs to another study.
 pub fn make_links(path: impl AsRef<Path>, design: &str, count: u32) -> Result<Vec<String>, StoreError> {
     let path = path.as_ref();
     let failed = |source| StoreError::Database { path: path.to_owned(), source };
@@ -41,9 +35,6 @@ pub fn make_links(path: impl AsRef<Path>, design: &str, count: u32) -> Result<Ve
 
 /// Copies a database, consistent even while a server writes to it. The copy is a database like the original:
 /// to restore it, put it in the place of the original while no server runs.
-///
-/// # Errors
-/// [`StoreError`] if the database belongs to another study, or the copy exists or cannot be written.
 pub fn back_up(path: impl AsRef<Path>, design: &str, to: impl AsRef<Path>) -> Result<(), StoreError> {
     let (path, to) = (path.as_ref(), to.as_ref());
     let connection = open_existing(path, design)?;
@@ -55,18 +46,12 @@ pub fn back_up(path: impl AsRef<Path>, design: &str, to: impl AsRef<Path>) -> Re
 }
 
 /// Reads one session. The database may be in use by a server.
-///
-/// # Errors
-/// [`StoreError`] if it is not there or the database belongs to another study.
 pub fn read_one(path: impl AsRef<Path>, design: &str, code: &str) -> Result<SessionRecord, StoreError> {
     let path = path.as_ref();
     load(&open_existing(path, design)?, path, code)
 }
 
 /// Erases one session. The database may be in use by a server.
-///
-/// # Errors
-/// [`StoreError`] if it is not there or the database belongs to another study.
 pub fn erase_one(path: impl AsRef<Path>, design: &str, code: &str) -> Result<(), StoreError> {
     let path = path.as_ref();
     let mut connection = open_existing(path, design)?;

@@ -5,10 +5,8 @@ use crate::session::Plan;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One stored session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SessionRecord {
-    /// The participant's code.
     pub code: String,
     /// Seed of the order of trials. A string in JSON: the numbers of JavaScript would round it.
     #[serde(with = "seed_as_text")]
@@ -48,7 +46,6 @@ mod seed_as_text {
 /// A session about to begin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NewSession {
-    /// The participant's code.
     pub code: String,
     /// Seed of the order of trials.
     pub seed: u64,

@@ -35,10 +35,6 @@ enum Command {
 impl AnswerStore {
     /// Opens the database of a study, creating it if needed. `design` identifies what the answers depend on
     /// ([`crate::Study::design`]).
-    ///
-    /// # Errors
-    /// [`StoreError::Database`] if it cannot be opened, [`StoreError::OtherStudy`] if it belongs to another
-    /// design.
     pub fn open(path: impl AsRef<Path>, design: &str) -> Result<Self, StoreError> {
         let path = path.as_ref().to_owned();
         // A log that is left is of a server that was killed: perhaps before it had removed what it erased
@@ -55,62 +51,40 @@ impl AnswerStore {
     }
 
     /// Draws and stores the trials of sessions that were begun before trials were stored.
-    ///
-    /// # Errors
-    /// [`StoreError`] if they could not be stored.
     pub(crate) async fn keep_plans(&self, study: Arc<Study>) -> Result<(), StoreError> {
         self.ask(|reply| Command::KeepPlans { study, reply }).await
     }
 
     /// Begins a session and returns its code. A link that was used before leads to the session it began.
-    ///
-    /// # Errors
-    /// [`StoreError::NoLink`] if the link does not exist, [`StoreError`] if the session could not be stored.
     pub async fn begin(&self, session: NewSession) -> Result<String, StoreError> {
         let session = Box::new(session);
         self.ask(|reply| Command::Begin { session, reply }).await
     }
 
     /// The codes of all sessions, in the order they began.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the database cannot be read.
     pub async fn codes(&self) -> Result<Vec<String>, StoreError> {
         self.ask(|reply| Command::Codes { reply }).await
     }
 
     /// Stores an event. It is on disk when this returns.
-    ///
-    /// # Errors
-    /// [`StoreError::Unknown`] if the session does not exist or was erased, [`StoreError::Conflict`] if the
-    /// number is taken.
     pub(crate) async fn append(&self, code: &str, envelope: Envelope) -> Result<(), StoreError> {
         let (code, envelope) = (code.to_owned(), Box::new(envelope));
         self.ask(|reply| Command::Append { code, envelope, reply }).await
     }
 
     /// Loads a session with all its events.
-    ///
-    /// # Errors
-    /// [`StoreError::Unknown`] if it is not there.
     pub async fn load(&self, code: &str) -> Result<SessionRecord, StoreError> {
         let code = code.to_owned();
         self.ask(|reply| Command::Load { code, reply }).await
     }
 
     /// Loads one event of a session, if it exists.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the database cannot be read.
     pub async fn event(&self, code: &str, seq: u64) -> Result<Option<Envelope>, StoreError> {
         let code = code.to_owned();
         self.ask(|reply| Command::Event { code, seq, reply }).await
     }
 
     /// Erases a session and all its events, including their traces in free pages and the log.
-    ///
-    /// # Errors
-    /// [`StoreError::Unknown`] if it is not there.
     pub async fn erase(&self, code: &str) -> Result<(), StoreError> {
         let code = code.to_owned();
         self.ask(|reply| Command::Erase { code, reply }).await

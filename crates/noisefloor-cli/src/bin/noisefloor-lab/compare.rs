@@ -32,7 +32,6 @@ pub struct Named {
 /// What to compare, and on which scenes: checked.
 pub struct CompareJob {
     pub scenes: Vec<OsString>,
-    /// For whatever scene.
     pub source: SourceJob,
     pub resources: Resources,
     pub out: PathBuf,

@@ -29,7 +29,6 @@ struct Summary<'a> {
     tone_mapping: ToneMapping,
     /// `line` or `svm`.
     machine: &'static str,
-    /// Of an svm.
     support_vectors: Option<usize>,
     /// How thresholds scatter around what the model expects, as standard deviations of ln(samples).
     spread: Option<Spread>,

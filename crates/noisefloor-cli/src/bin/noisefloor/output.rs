@@ -158,7 +158,6 @@ impl Output {
         self.seconds_before = self.timeline.last().map_or(0.0, |row| row.seconds);
     }
 
-    /// Notes one batch.
     pub fn record(&mut self, session: &Session, progress: &Progress) {
         let rel_mse = self
             .reference
@@ -240,7 +239,6 @@ impl Output {
 pub enum Finished {
     /// Nothing, or a render under way.
     Not,
-    /// All of it.
     This,
     /// All of it but a picture, which somebody has removed.
     Lost,

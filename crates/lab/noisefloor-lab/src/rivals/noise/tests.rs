@@ -46,7 +46,6 @@ struct Seen {
     halves: f64,
     between_batches: f64,
     snapshots: Option<f64>,
-    /// Batches so far.
     batches: usize,
 }
 

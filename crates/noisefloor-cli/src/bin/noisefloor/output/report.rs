@@ -12,7 +12,6 @@ use std::collections::BTreeMap;
 pub(super) struct Report<'a> {
     noisefloor: &'static str,
     scene: &'a str,
-    /// Who rendered.
     source: &'a str,
     width: usize,
     height: usize,
@@ -45,7 +44,6 @@ pub(super) struct Report<'a> {
     expected_threshold: Option<ExpectedThreshold>,
     /// Share of people who see no noise anywhere in the picture, by the last verdicts on its tiles.
     people_in_picture: Option<f64>,
-    /// Over all pixels.
     samples: u64,
     /// What uniform rendering at the largest stop would take.
     samples_uniform: u64,
@@ -74,7 +72,6 @@ pub(super) struct Report<'a> {
     seconds_oracle: Option<f64>,
     seconds_total: Option<f64>,
     rel_mse: Option<f64>,
-    /// With --denoise.
     #[serde(skip_serializing_if = "Option::is_none")]
     denoised: Option<DenoisedReport>,
 }

@@ -11,7 +11,6 @@ use std::time::Duration;
 
 const FILE: &str = "forecast.json";
 
-/// forecast.json.
 #[derive(Serialize)]
 struct Forecasts<'a> {
     /// All frames, as they are typed.

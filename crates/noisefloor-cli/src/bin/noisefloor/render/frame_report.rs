@@ -18,7 +18,6 @@ pub(super) struct FrameRow {
     unfamiliar_tiles: usize,
 }
 
-/// What report.json says.
 #[derive(Deserialize)]
 pub(super) struct FrameReport {
     pub(super) complete: bool,

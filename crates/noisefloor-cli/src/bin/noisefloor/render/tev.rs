@@ -54,9 +54,6 @@ impl Tev {
     }
 
     /// Sends the tiles that have changed, if it is time; `last`, whenever it is.
-    ///
-    /// # Errors
-    /// If tev has gone away.
     fn show(&mut self, session: &Session, last: bool) -> io::Result<()> {
         if !last && !self.pace.is_due() {
             return Ok(());

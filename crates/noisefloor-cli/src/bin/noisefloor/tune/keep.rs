@@ -17,7 +17,6 @@ use std::path::PathBuf;
 const REPORT: &str = "tune.json";
 const FILES: &[&str] = &[REPORT, "image.exr", "image.png", "report.json"];
 
-/// The folder.
 pub struct Keep(Folder);
 
 /// What tune.json says of an earlier search.

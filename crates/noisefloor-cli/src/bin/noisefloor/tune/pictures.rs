@@ -26,7 +26,6 @@ const BATCH: u64 = 64;
 /// Most samples per pixel of a program that nobody has told how many.
 const MOST_SPP: u64 = 16_384;
 
-/// Who renders pairs.
 pub enum Pictures {
     /// Samples per pixel, everywhere alike; of each half of a film, which grows.
     Samples { source: Box<dyn Source>, film: Film },
@@ -280,7 +279,6 @@ fn cut<T: Copy>(part: Tile, width: usize, picture: &[T]) -> Vec<T> {
     part.rows(width).flatten().map(|pixel| picture[pixel]).collect()
 }
 
-/// What judges pairs.
 pub struct Judges<'a> {
     criterion: &'a TuneCriterion,
     params: Params,
