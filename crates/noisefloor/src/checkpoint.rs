@@ -3,7 +3,7 @@
 use crate::container::{self, FileFault, Format, MAX_PAYLOAD};
 use crate::criterion::StoppingCriterion;
 use crate::display::Display;
-use crate::film::{Film, FilmHead};
+use crate::film::{Film, planes::FilmHead};
 use crate::params::{Audience, Params, Schedule};
 use crate::session::{Goal, Settling, TileState};
 use crate::source::{IdentityChange, SourceIdentity};

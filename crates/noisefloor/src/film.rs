@@ -9,8 +9,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use thiserror::Error;
 
-mod planes;
-pub(crate) use planes::FilmHead;
+pub(crate) mod planes;
 
 /// Samples per pixel that no half of a tile has: sums over the largest picture, of 2²⁸ pixels, stay within 64 bits.
 const COUNTABLE: u64 = 1 << 34;

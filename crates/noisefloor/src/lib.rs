@@ -70,6 +70,7 @@ pub mod model;
 mod nested;
 pub mod oracle;
 pub mod params;
+mod people;
 mod plane;
 mod rgb;
 pub mod session;

@@ -6,7 +6,7 @@ use crate::display::ToneMapping;
 use crate::evidence::Evidence;
 use crate::params::Audience;
 #[cfg(feature = "internals")]
-use crate::{descriptor::Descriptor, oracle::Spread, svm::Classifier};
+use crate::{descriptor::Descriptor, people::Spread, svm::Classifier};
 use noisefloor_vision::Viewing;
 #[cfg(feature = "files")]
 use std::io;

@@ -14,12 +14,11 @@ use rayon::prelude::*;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
-mod people;
 #[cfg(not(feature = "internals"))]
-pub(crate) use people::Spread;
+pub(crate) use crate::people::Spread;
 #[cfg(feature = "internals")]
-pub use people::Spread;
-pub use people::{People, PeopleError};
+pub use crate::people::Spread;
+pub use crate::people::{People, PeopleError};
 
 /// A tile with more than one in this many pixels without valid samples gives no evidence, and is not called
 /// converged.

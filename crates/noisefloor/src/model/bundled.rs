@@ -5,8 +5,8 @@ use super::{Familiarity, Model, ModelParts, Scores, TrainingRecord};
 use crate::descriptor::{Descriptor, DescriptorSpec};
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
-use crate::oracle::Spread;
 use crate::params::Audience;
+use crate::people::Spread;
 use crate::svm::{Classifier, Line, Machine, Platt, Scaler};
 use noisefloor_vision::{Eotf, Primaries, Viewing};
 

@@ -4,8 +4,8 @@ use super::familiarity::{CAUTION, Familiarity};
 use crate::descriptor::Descriptor;
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
-use crate::oracle::Spread;
 use crate::params::Audience;
+use crate::people::Spread;
 use crate::svm::{Classifier, Machine, from_log_odds};
 use noisefloor_vision::Viewing;
 #[cfg(feature = "files")]
