@@ -5,11 +5,11 @@ use crate::bsdf;
 use crate::camera::Lens;
 use crate::geometry::Intersection;
 use crate::guide::{Contributions, Guide, GuidedSample};
-use crate::intersection::OpacityTest;
 use crate::light::LightSample;
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3};
 use crate::rng::{GOLDEN, mix};
+use crate::sampler::Draws;
 use crate::scene::{Scene, Sky};
 use std::f32::consts::FRAC_1_PI;
 
@@ -93,20 +93,16 @@ impl<'a> Tracer<'a> {
         mix(self.seed.wrapping_add((4 * code + purpose as u64).wrapping_mul(GOLDEN)))
     }
 
-    fn opacity_test(&self, code: u64, purpose: Use) -> OpacityTest {
-        OpacityTest::Stratified { index: self.index, seed: self.seed(code, purpose) }
-    }
-
     /// Radiance along a ray, times its weight.
     fn radiance(&mut self, branch: Branch) -> Vec3 {
         let Branch { ray, from, passed, density, weight, eta2, code } = branch;
         let scene = self.scene;
-        let test = self.opacity_test(code, Use::Ray);
-        let hit = scene.closest::<true>(&ray, &mut self.stack, test);
+        let draws = Draws { index: self.index, seed: self.seed(code, Use::Ray) };
+        let hit = scene.closest::<true>(&ray, &mut self.stack, draws);
         if hit.is_miss() {
             return weight * self.background(ray.dir, density).0;
         }
-        let surface = scene.surface(&ray, &hit);
+        let surface = scene.surface(&ray, &hit, draws);
         let mut sum = Vec3::ZERO;
         if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
             let own = emitted.light.pdf(from, passed + hit.t, emitted.cos);
@@ -268,8 +264,8 @@ impl<'a> Tracer<'a> {
             // Not finite if the density is beyond the range of f32
             let counts = share.max_element() > 0.0 && share.is_finite();
             let shadow = Ray { origin, dir };
-            let test = OpacityTest::Stratified { index, seed };
-            if counts && !scene.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack, test) {
+            let draws = Draws { index, seed };
+            if counts && !scene.blocked::<true>(&shadow, distance * 0.9999, &mut self.stack, draws) {
                 let light = share * scene.deferred_radiance(light, dir);
                 self.note(stratum, light);
                 sum += light;
@@ -298,8 +294,7 @@ impl<'a> Tracer<'a> {
                 continue;
             }
             let ray = Ray { origin: surface.leave(dir), dir };
-            let (radiance, stratum) =
-                self.emitted_along(&ray, OpacityTest::Stratified { index, seed }, density * n as f32);
+            let (radiance, stratum) = self.emitted_along(&ray, Draws { index, seed }, density * n as f32);
             let light = weight * scattered(dir) * radiance / (density * n as f32);
             if let Some(stratum) = stratum {
                 self.note(stratum, light);
@@ -311,16 +306,16 @@ impl<'a> Tracer<'a> {
 
     /// The weighted light that a ray hits, whose direction was sampled with that density, and the stratum of
     /// its last light.
-    fn emitted_along(&mut self, ray: &Ray, test: OpacityTest, density: f32) -> (Vec3, Option<usize>) {
+    fn emitted_along(&mut self, ray: &Ray, mut draws: Draws, density: f32) -> (Vec3, Option<usize>) {
         let (scene, mut passed, mut onward) = (self.scene, 0.0, *ray);
         let (mut sum, mut stratum) = (Vec3::ZERO, None);
         loop {
-            let hit = scene.closest::<true>(&onward, &mut self.stack, test);
+            let hit = scene.closest::<true>(&onward, &mut self.stack, draws);
             if hit.is_miss() {
                 let (radiance, seen) = self.background(ray.dir, density);
                 return (sum + radiance, seen.or(stratum));
             }
-            let surface = scene.surface(&onward, &hit);
+            let surface = scene.surface(&onward, &hit, draws);
             passed += hit.t;
             if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
                 let own = emitted.light.pdf(ray.origin, passed, emitted.cos);
@@ -331,6 +326,7 @@ impl<'a> Tracer<'a> {
                 return (sum, stratum);
             }
             onward.origin = surface.leave(ray.dir);
+            draws = draws.next();
         }
     }
 

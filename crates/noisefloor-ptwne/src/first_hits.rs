@@ -8,11 +8,10 @@ use crate::accel::Stack;
 use crate::bsdf::{fresnel, pane, refract};
 use crate::filter::Filter;
 use crate::geometry::Intersection;
-use crate::intersection::OpacityTest;
 use crate::material::Bsdf;
 use crate::math::{Ray, Vec3, reflect};
 use crate::rng::{Key, mix};
-use crate::sampler::{Place, Sampler, Sampling};
+use crate::sampler::{Draws, Place, Sampler, Sampling};
 use crate::scene::Scene;
 use noisefloor::{Rgb, source::FirstHits};
 use rayon::prelude::*;
@@ -48,7 +47,7 @@ pub(crate) fn render(
             let [u, v, lens_u, lens_v] = sampler.four();
             let [dx, dy] = filter.offset([u, v]);
             let ray = lens.ray(x as f32 + dx, y as f32 + dy, [lens_u, lens_v]);
-            seen.add(eye.look(ray, sampler.seed()));
+            seen.add(eye.look(ray, sampler.draws()));
         }
         seen.means()
     };
@@ -112,20 +111,20 @@ impl<'a> Eye<'a> {
     }
 
     /// Albedo and normal of what the ray shows. The background is its own colour, and has no normal.
-    fn look(&mut self, ray: Ray, mut seed: u64) -> (Vec3, Vec3) {
+    fn look(&mut self, ray: Ray, mut draws: Draws) -> (Vec3, Vec3) {
         let (mut albedo, mut normal) = (Vec3::ZERO, Vec3::ZERO);
         self.ways.push(Way { ray, colour: Vec3::ONE, share: 1.0, boundaries: 0 });
         while let Some(way) = self.ways.pop() {
+            draws = draws.next();
             // A scene without opacity passes every test of it
-            let hit = self.scene.closest::<true>(&way.ray, &mut self.stack, OpacityTest::Random(seed));
-            seed = seed.wrapping_add(1);
+            let hit = self.scene.closest::<true>(&way.ray, &mut self.stack, draws);
             if hit.is_miss() {
                 let background = self.scene.background(way.ray.dir, |_, _| 1.0);
                 // NaN becomes 0, too
                 albedo += way.colour * background.max(Vec3::ZERO).min(Vec3::ONE);
                 continue;
             }
-            let surface = self.scene.surface(&way.ray, &hit);
+            let surface = self.scene.surface(&way.ray, &hit, draws);
             if way.boundaries == BOUNDARIES || !self.passes(&way, &surface) {
                 let colour = surface.material.bsdf.colour(surface.uv, surface.tint);
                 albedo += way.colour * colour.max(Vec3::ZERO).min(Vec3::ONE);

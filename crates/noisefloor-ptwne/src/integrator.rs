@@ -1,13 +1,12 @@
 //! Path tracing with next event estimation.
 
-use crate::accel::{Hit, Stack};
+use crate::accel::Stack;
 use crate::bsdf;
 use crate::geometry::Intersection;
-use crate::intersection::OpacityTest;
 use crate::light::{LightSample, Prospect, Receiver};
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3, power_heuristic};
-use crate::sampler::Sampler;
+use crate::sampler::{Draws, Sampler};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::FRAC_1_PI;
@@ -58,9 +57,9 @@ fn radiance<const OPACITY: bool>(
     sampler: &mut Sampler,
     stack: &mut Stack,
 ) -> Vec3 {
-    let seed = if OPACITY { sampler.seed() } else { 0 };
+    let draws = sampler.draws();
     let prospect = Prospect::unknown(Receiver::diffuse(ray.origin, ray.dir));
-    Path::<OPACITY> { scene, settings, sampler, stack, seed, prospect }.radiance(ray)
+    Path::<OPACITY> { scene, settings, sampler, stack, draws, prospect }.radiance(ray)
 }
 
 struct Path<'a, const OPACITY: bool> {
@@ -68,8 +67,8 @@ struct Path<'a, const OPACITY: bool> {
     settings: Settings,
     sampler: &'a mut Sampler,
     stack: &'a mut Stack,
-    /// Seed of opacity tests; another one for each ray.
-    seed: u64,
+    /// Of the last ray, but for shadow rays.
+    draws: Draws,
     /// Of the last surface that sampled a light.
     prospect: Prospect,
 }
@@ -99,14 +98,16 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let mut depth = 0;
         loop {
             depth += 1;
-            let hit = self.closest(&ray);
+            // One step for this ray, and one for the shadow ray from where it ends
+            self.draws = self.draws.next().next();
+            let hit = scene.closest::<OPACITY>(&ray, self.stack, self.draws);
             if hit.is_miss() {
                 return sum
                     + throughput
                         * scene
                             .background(ray.dir, |light, light_pdf| self.hit_weight(pdf, light, light_pdf));
             }
-            let surface = scene.surface(&ray, &hit);
+            let surface = scene.surface(&ray, &hit, self.draws);
 
             // Light that the ray hit
             if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
@@ -148,23 +149,8 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
     }
 
     #[inline(always)]
-    fn closest(&mut self, ray: &Ray) -> Hit {
-        let test = self.opacity_test();
-        self.scene.closest::<OPACITY>(ray, self.stack, test)
-    }
-
-    #[inline(always)]
     fn blocked(&mut self, ray: &Ray, distance: f32) -> bool {
-        let test = self.opacity_test();
-        self.scene.blocked::<OPACITY>(ray, distance, self.stack, test)
-    }
-
-    #[inline(always)]
-    fn opacity_test(&mut self) -> OpacityTest {
-        if OPACITY {
-            self.seed = self.seed.wrapping_add(1);
-        }
-        OpacityTest::Random(self.seed)
+        self.scene.blocked::<OPACITY>(ray, distance, self.stack, self.draws.next())
     }
 
     /// The weight of light that a ray sampled with density `pdf` hit. Samples of that light have density

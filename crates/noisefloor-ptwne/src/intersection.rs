@@ -6,7 +6,7 @@ use crate::geometry::{Group, Intersection, NO, RINGS, RINGS_REVERSED};
 use crate::material::Bsdf;
 use crate::math::{Frame, Ray, Vec3};
 use crate::relief::{self, Relief};
-use crate::rng;
+use crate::sampler::Draws;
 use crate::scene::Scene;
 use crate::texture::{Coordinates, Texture, twice};
 use std::f32::consts::PI;
@@ -18,27 +18,17 @@ const COAT: f32 = 0.04;
 /// hundred roundings.
 const OFFSET: f32 = 1e-5;
 
-/// How it is decided whether a ray passes a partly transparent surface.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum OpacityTest {
-    /// At random, by the seed of the ray.
-    Random(u64),
-    /// As ray `index` of a sequence: of every 2ᵏ consecutive rays, each surface stops its share to the
-    /// nearest ray, and different surfaces stop different rays.
-    Stratified { index: u32, seed: u64 },
-}
+/// The choice between the parts of a mix, among [`Draws`] of surfaces: none has this index.
+const PART: u64 = u64::MAX;
+/// The largest number below 1.
+const BELOW_1: f32 = 1.0 - f32::EPSILON / 2.0;
 
 impl Scene {
     /// The nearest surface along the ray.
     #[inline]
-    pub(crate) fn closest<const OPACITY: bool>(
-        &self,
-        ray: &Ray,
-        stack: &mut Stack,
-        test: OpacityTest,
-    ) -> Hit {
+    pub(crate) fn closest<const OPACITY: bool>(&self, ray: &Ray, stack: &mut Stack, draws: Draws) -> Hit {
         if OPACITY {
-            self.bvh.closest(ray, stack, |prim, instance, spot| self.is_solid(prim, instance, spot, test))
+            self.bvh.closest(ray, stack, |prim, instance, spot| self.is_solid(prim, instance, spot, draws))
         } else {
             self.bvh.closest(ray, stack, |_, _, _| true)
         }
@@ -51,19 +41,19 @@ impl Scene {
         ray: &Ray,
         t_max: f32,
         stack: &mut Stack,
-        test: OpacityTest,
+        draws: Draws,
     ) -> bool {
         if OPACITY {
             self.bvh.blocked::<true>(ray, t_max, stack, |prim, instance, spot| {
                 let material = self.geometry.group(prim).material;
-                self.is_solid(prim, instance, spot, test) && !self.materials[material as usize].is_nothing()
+                self.is_solid(prim, instance, spot, draws) && !self.materials[material as usize].is_nothing()
             })
         } else {
             self.bvh.blocked::<false>(ray, t_max, stack, |_, _, _| true)
         }
     }
 
-    fn is_solid(&self, prim: u32, instance: u32, spot: Spot, test: OpacityTest) -> bool {
+    fn is_solid(&self, prim: u32, instance: u32, spot: Spot, draws: Draws) -> bool {
         let group = self.geometry.group(prim);
         let material = &self.materials[group.material as usize];
         let (Spot::Plane { front, .. } | Spot::Sphere { front, .. }) = spot;
@@ -95,27 +85,21 @@ impl Scene {
                 }
                 // The two sides of a sphere decide for themselves, and so do instances
                 let side = u64::from(far) << 63 | u64::from(instance.wrapping_add(1)) << 32;
-                let number = match test {
-                    OpacityTest::Random(seed) => rng::hash(seed ^ side, prim),
-                    OpacityTest::Stratified { index, seed } => {
-                        sobol_burley::sample(index, 0, rng::mix(seed ^ side ^ u64::from(prim)) as u32)
-                    }
-                };
-                number < opacity
+                draws.number(side | u64::from(prim)) < opacity
             }
         }
     }
 
-    /// The surface that the ray hit.
+    /// The surface that the ray hit; of a mix one of its parts.
     #[inline]
-    pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> Intersection<'_> {
+    pub(crate) fn surface(&self, ray: &Ray, hit: &Hit, draws: Draws) -> Intersection<'_> {
         match self.bvh.instance(hit) {
-            None => self.surface_of::<false>(ray, hit),
-            Some(_) => self.surface_of::<true>(ray, hit),
+            None => self.surface_of::<false>(ray, hit, draws),
+            Some(_) => self.surface_of::<true>(ray, hit, draws),
         }
     }
 
-    fn surface_of<const INSTANCE: bool>(&self, ray: &Ray, hit: &Hit) -> Intersection<'_> {
+    fn surface_of<const INSTANCE: bool>(&self, ray: &Ray, hit: &Hit, draws: Draws) -> Intersection<'_> {
         let (prim, shape) = self.bvh.shape_at::<INSTANCE>(hit);
         let group = self.geometry.group(prim);
         let material = &self.materials[group.material as usize];
@@ -154,14 +138,16 @@ impl Scene {
         }
         let tint = if group.colours == NO { Vec3::ONE } else { self.geometry.tint(group, prim, hit.uv) };
         let (mut material, mut relief) = (material, &material.relief);
+        let mut number = if let Bsdf::Mix { .. } = material.bsdf { draws.number(PART) } else { 0.0 };
         while let Bsdf::Mix { parts, share, coat } = &material.bsdf {
-            let number = rng::hash(bits_of(ray, hit.t), parts[0]);
             let share = share.tinted(uv, tint);
             let mut share = (share.x + share.y + share.z) * (1.0 / 3.0);
             if *coat {
                 share *= schlick(Vec3::splat(COAT), -ray.dir.dot(normal)).x;
             }
+            // Where the number lies in the interval of the part that it chose is a number for the mixes in that part
             let second = number < share;
+            number = if second { number / share } else { ((number - share) / (1.0 - share)).min(BELOW_1) };
             material = &self.materials[parts[usize::from(second)] as usize];
             if material.relief.is_some() {
                 relief = &material.relief;
@@ -206,13 +192,6 @@ struct Sides {
     front: bool,
     uv: Coordinates,
     shiny: bool,
-}
-
-/// The bits of a ray and a distance: different ones for different samples, so that a hash of them is random.
-#[inline]
-fn bits_of(ray: &Ray, t: f32) -> u64 {
-    let word = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
-    rng::mix(word(ray.dir.x, ray.dir.y)) ^ word(ray.dir.z, t)
 }
 
 /// Azimuth and polar angle of a sphere's normal, each in 0…1.

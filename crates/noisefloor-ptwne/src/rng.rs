@@ -23,12 +23,6 @@ pub(crate) fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A hash, uniform in [0, 1).
-#[inline]
-pub(crate) fn hash(seed: u64, index: u32) -> f32 {
-    unit((mix(seed ^ u64::from(index).wrapping_mul(GOLDEN)) >> 40) as u32)
-}
-
 /// xoroshiro128++ (Blackman, Vigna 2021), seeded with a hash of (seed, pixel, sample index): one short stream
 /// per path, so that pictures do not depend on threads or batches.
 #[derive(Clone, Debug)]

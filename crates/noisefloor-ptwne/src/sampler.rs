@@ -85,14 +85,41 @@ impl Sampler {
         }
     }
 
-    /// A seed that no other path has, for decisions that are hashed instead of drawn in order. It uses up no
-    /// number, so that paths are the same with and without it.
+    /// The numbers of what rays of this path may meet on their way. They use up none of the path's own, so that paths
+    /// are the same with and without them.
     #[inline]
-    pub(crate) fn seed(&self) -> u64 {
+    pub(crate) fn draws(&self) -> Draws {
         match self {
-            Self::Independent(rng) => rng.clone().next(),
-            Self::Sobol { index, seed } => mix(*seed ^ (u64::from(*index) << 32)),
+            Self::Independent(rng) => Draws { index: 0, seed: rng.clone().next() },
+            Self::Sobol { index, seed } => Draws { index: *index, seed: !seed },
         }
+    }
+}
+
+/// A number for each surface that a ray may meet: whether a partly transparent one stops it, and which part of a mix
+/// it is. A surface has a Sobol sequence of its own, so that its choices are stratified over the rays of a sequence,
+/// and independent of those of all other surfaces.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Draws {
+    /// The point of the sequences.
+    pub(crate) index: u32,
+    /// What they are scrambled and shuffled by.
+    pub(crate) seed: u64,
+}
+
+impl Draws {
+    /// The number of a surface, or of another choice, in [0, 1).
+    #[inline]
+    pub(crate) fn number(self, of: u64) -> f32 {
+        let seed = mix(self.seed ^ of);
+        let place = laine_karras(self.index.reverse_bits(), seed as u32).reverse_bits();
+        unit(laine_karras(place, (seed >> 32) as u32).reverse_bits() >> 8)
+    }
+
+    /// Those of the next ray.
+    #[inline]
+    pub(crate) fn next(self) -> Self {
+        Self { seed: self.seed.wrapping_add(GOLDEN), ..self }
     }
 }
 
@@ -159,7 +186,7 @@ mod tests {
     fn no_sequence_repeats_another() {
         let seed = |number, first| {
             let place = Place { sample: 0, sequence: Sequence::new(number, first) };
-            Sampler::new(Sampling::Sobol, Key::new(3), 17, place).seed()
+            Sampler::new(Sampling::Sobol, Key::new(3), 17, place).draws().seed
         };
         let mut seeds = Vec::new();
         for number in [0, 1, 2, 3, 4, 5, 1 << 16, u32::MAX] {

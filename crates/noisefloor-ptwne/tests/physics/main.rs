@@ -18,6 +18,7 @@ mod instances; // objects shown many times: as their copies are seen
 mod kit;
 mod media;
 mod mis; // next events, scattering, and both
+mod mixes; // choices between materials, and between a surface and what lies behind it
 mod models; // glTF's, Mitsuba's and pbrt's layered surfaces
 mod points; // spots and projectors
 mod reference; // how free of noise the reference is
