@@ -21,14 +21,19 @@ impl Means {
             // The readers make no others
             _ => return [0.5; 3],
         };
-        let key = match &image.pixels {
-            Pixels::Srgb8(codes) | Pixels::Linear8(codes) => codes.as_ptr().addr(),
-            Pixels::Float(values) => values.as_ptr().addr(),
-        };
+        let key = address(&image.pixels);
         let mut known = self.known.borrow_mut();
         let plain = || ImageTexture { factor: [1.0; 3], ..image.clone() }.mean();
         let (_, mean) = known.entry(key).or_insert_with(|| (image.pixels.clone(), plain()));
         std::array::from_fn(|i| mean[i] * image.factor[i])
+    }
+}
+
+/// Where pixels lie: the same for all textures that share them.
+pub(crate) fn address(pixels: &Pixels) -> usize {
+    match pixels {
+        Pixels::Srgb8(codes) | Pixels::Linear8(codes) => codes.as_ptr().addr(),
+        Pixels::Float(values) => values.as_ptr().addr(),
     }
 }
 
@@ -52,35 +57,43 @@ pub(crate) fn mapped(image: &ImageTexture, change: impl Fn(Rgb) -> Rgb) -> Image
     ImageTexture { pixels, factor: [1.0; 3], ..image.clone() }
 }
 
-/// Grey textures as one, whose pixels `put` makes of their values. A picture that does not lie as the first
-/// does is replaced by its mean; the second result is whether there was one.
+/// Textures as one, whose pixels `put` makes of their colours. A picture that does not lie as the first does is
+/// replaced by its mean; the second result is whether there was one.
+pub(crate) fn combined<const N: usize>(
+    parts: [&Texture; N],
+    mean: impl Fn(&Texture) -> Rgb,
+    put: impl Fn([Rgb; N]) -> Rgb,
+) -> (Texture, bool) {
+    let means = parts.map(mean);
+    let first =
+        parts.iter().find_map(|part| if let Texture::Image(image) = part { Some(image) } else { None });
+    let Some(first) = first else { return (Texture::Colour(put(means)), false) };
+    let lies = |image: &ImageTexture| (image.width, image.height, image.to_uv, image.wrap, image.nearest);
+    let values = parts.map(|part| match part {
+        Texture::Image(image) if lies(image) == lies(first) => {
+            let value = |p: Rgb| std::array::from_fn(|i| p[i] * image.factor[i]);
+            Some(linear(&image.pixels).into_iter().map(value).collect::<Vec<Rgb>>())
+        }
+        _ => None,
+    });
+    let replaced = (0..N).any(|i| values[i].is_none() && !matches!(parts[i], Texture::Colour(_)));
+    let pixel = |at: usize| {
+        let colours = std::array::from_fn(|i| values[i].as_ref().map_or(means[i], |values| values[at]));
+        put(colours).map(|c| c.clamp(0.0, 1.0))
+    };
+    let pixels = Pixels::Float((0..first.width * first.height).map(pixel).collect());
+    (Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..first.clone() }), replaced)
+}
+
+/// The same of grey ones.
 pub(crate) fn joined<const N: usize>(
     parts: [&Texture; N],
     mean: impl Fn(&Texture) -> Rgb,
     put: impl Fn([f32; N]) -> Rgb,
 ) -> (Texture, bool) {
     let grey = |p: Rgb| (p[0] + p[1] + p[2]) / 3.0;
-    let means = parts.map(|part| grey(mean(part)));
-    let first =
-        parts.iter().find_map(|part| if let Texture::Image(image) = part { Some(image) } else { None });
-    let Some(first) = first else {
-        return (Texture::Colour(put(means).map(|c| c.clamp(0.0, 1.0))), false);
-    };
-    let lies = |image: &ImageTexture| (image.width, image.height, image.to_uv, image.wrap, image.nearest);
-    let values = parts.map(|part| match part {
-        Texture::Image(image) if lies(image) == lies(first) => {
-            let value = |p: Rgb| grey(std::array::from_fn(|i| p[i] * image.factor[i]));
-            Some(linear(&image.pixels).into_iter().map(value).collect::<Vec<f32>>())
-        }
-        _ => None,
-    });
-    let replaced = (0..N).any(|i| values[i].is_none() && !matches!(parts[i], Texture::Colour(_)));
-    let pixel = |at: usize| {
-        let numbers = std::array::from_fn(|i| values[i].as_ref().map_or(means[i], |values| values[at]));
-        put(numbers).map(|c| c.clamp(0.0, 1.0))
-    };
-    let pixels = Pixels::Float((0..first.width * first.height).map(pixel).collect());
-    (Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..first.clone() }), replaced)
+    let inside = |colour: Rgb| colour.map(|c| c.clamp(0.0, 1.0));
+    combined(parts, mean, |colours| inside(put(colours.map(grey))))
 }
 
 #[cfg(test)]

@@ -161,8 +161,8 @@ const RGB_OF_XYZ: [[f64; 3]; 3] = [
     [0.055_648, -0.204_043, 1.057_311],
 ];
 
-/// Chromaticities x and y of the CIE's standard illuminants (CIE 15:2004, tables T.3 and T.8), and of the D60
-/// of ACES (SMPTE ST 2065-1).
+/// Chromaticities x and y of the CIE's standard illuminants (CIE 15:2004, tables T.3 and T.8; the y of F10 is that of
+/// its spectrum), and of the D60 of ACES (SMPTE ST 2065-1).
 const ILLUMINANTS: [(&str, [f64; 2]); 16] = [
     ("A", [0.447_57, 0.407_45]),
     ("D50", [0.345_67, 0.358_50]),
@@ -177,7 +177,7 @@ const ILLUMINANTS: [(&str, [f64; 2]); 16] = [
     ("F7", [0.312_92, 0.329_33]),
     ("F8", [0.345_88, 0.358_75]),
     ("F9", [0.374_17, 0.372_81]),
-    ("F10", [0.346_09, 0.359_86]),
+    ("F10", [0.346_09, 0.358_96]),
     ("F11", [0.380_52, 0.377_13]),
     ("F12", [0.436_95, 0.404_41]),
 ];

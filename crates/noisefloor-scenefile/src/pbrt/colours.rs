@@ -5,7 +5,6 @@ use super::reader::Reader;
 use crate::colour::{self, Quantity, TEMPERATURES};
 use crate::error::LoadError;
 use crate::files::{self, MAX_FILE_BYTES};
-use crate::indices;
 use noisefloor::{Rgb, display::luminance};
 
 impl Reader<'_> {
@@ -25,15 +24,17 @@ impl Reader<'_> {
         Ok(Some(colour))
     }
 
-    /// The radiance of a light. pbrt 4 brings spectra to a luminance of 1; pbrt 3 takes them as they are, but
+    /// The radiance of a light as the film takes it. pbrt 4 brings spectra to a luminance of 1; pbrt 3 takes them as they are, but
     /// black bodies with a peak of 1. Both take `rgb` and `xyz` as they are.
-    pub(super) fn light(&self, params: &Params, name: &str) -> Result<Rgb, LoadError> {
+    pub(super) fn light(&mut self, params: &Params, name: &str) -> Result<Rgb, LoadError> {
+        let exposure = self.view.exposure;
         let scale = match params.numbers("scale")? {
             None => [1.0; 3],
             Some([grey]) => [*grey as f32; 3],
             Some([r, g, b]) => [*r as f32, *g as f32, *b as f32],
             Some(_) => return Err(params.bad("`scale` has neither one number nor three")),
-        };
+        }
+        .map(|c: f32| c * exposure);
         let Some(param) = params.get(name) else {
             let white = params.space.to_rec709([1.0; 3], Quantity::Light);
             return Ok(std::array::from_fn(|i| white[i] * scale[i]));
@@ -57,6 +58,11 @@ impl Reader<'_> {
                 if kind == "spectrum" && !self.version_3 { normalised(colour) } else { colour }
             }
             (_, Values::Texts(texts)) => {
+                if texts[0] == "stdillum-D50" {
+                    let what = "`stdillum-D50` is that of the CIE, [1.176 0.976 0.722]; \
+                        pbrt's table of it lacks red: [1.087 1.000 0.750]";
+                    self.approximated(&params.place, what);
+                }
                 let colour = self.named_spectrum(params, texts, Quantity::Light)?;
                 if self.version_3 { colour } else { normalised(colour) }
             }
@@ -110,24 +116,25 @@ impl Reader<'_> {
         quantity: Quantity,
     ) -> Result<Rgb, LoadError> {
         let [name] = texts else { return Err(params.bad("a spectrum has one name")) };
-        if let Some(rest) = name.strip_prefix("metal-") {
-            let (metal, part) = rest.rsplit_once('-').unwrap_or((rest, "eta"));
-            let found = if metal == "CuZn" { Some(BRASS) } else { indices::conductor(metal) };
-            if let Some((eta, k)) = found {
-                return Ok(if part == "k" { k } else { eta });
+        let not_as = |what: &str| Err(params.place.clone().unsupported(format!("`{name}` as a {what}")));
+        let glass = GLASSES.iter().find(|glass| glass.0 == name).map(|glass| [glass.1; 3]);
+        if let Some(index) = glass.or_else(|| metal(name)) {
+            return if quantity == Quantity::Factor { Ok(index) } else { not_as("light") };
+        }
+        if let Some(colour) = illuminant(name) {
+            return if quantity == Quantity::Light { Ok(colour) } else { not_as("factor") };
+        }
+        if is_of_a_sensor(name) {
+            return not_as("spectrum: it is what a camera's sensor responds to, which is not held here");
+        }
+        let path = self.folder.find(name, &params.place).map_err(|error| match error {
+            LoadError::Read { cause, .. } if cause.kind() == std::io::ErrorKind::NotFound => {
+                params.bad(format!(
+                    "there is no spectrum `{name}`: it is none of pbrt's names, and there is no such file"
+                ))
             }
-        }
-        if let Some((_, index)) = GLASSES.iter().find(|glass| glass.0 == name) {
-            return Ok([*index; 3]);
-        }
-        let illuminant = name.strip_prefix("stdillum-").or_else(|| name.strip_prefix("illum-"));
-        if let Some(colour) = illuminant.and_then(colour::of_illuminant) {
-            return match quantity {
-                Quantity::Light => Ok(colour),
-                Quantity::Factor => Err(params.place.clone().unsupported(format!("`{name}` as a factor"))),
-            };
-        }
-        let path = self.folder.find(name, &params.place)?;
+            other => other,
+        })?;
         let bytes = self.folder.read(&path, MAX_FILE_BYTES, &params.place)?;
         let text = files::text(&bytes);
         let words = files::lines(&text)
@@ -167,16 +174,55 @@ impl Reader<'_> {
     }
 }
 
-/// η + ik of brass.
-const BRASS: (Rgb, Rgb) = ([0.444, 0.527, 1.094], [3.695, 2.765, 1.829]);
+/// An illuminant by its name in pbrt 4.
+fn illuminant(name: &str) -> Option<Rgb> {
+    match name.strip_prefix("stdillum-") {
+        Some("acesD60") => None,
+        Some(standard) => colour::of_illuminant(standard),
+        None => colour::of_illuminant(name.strip_prefix("illum-").filter(|name| *name == "acesD60")?),
+    }
+}
 
-/// Glasses that pbrt 4 names, at 587.6 nm.
+/// η or k of a metal by its name in pbrt 4.
+fn metal(name: &str) -> Option<Rgb> {
+    let (metal, part) = name.strip_prefix("metal-")?.rsplit_once('-')?;
+    let (_, eta, k) = METALS.iter().find(|known| known.0 == metal)?;
+    match part {
+        "eta" => Some(*eta),
+        "k" => Some(*k),
+        _ => None,
+    }
+}
+
+/// Whether pbrt 4 calls one channel of a camera's sensor so.
+fn is_of_a_sensor(name: &str) -> bool {
+    let makes = ["canon_eos_", "hasselblad_", "nikon_", "sony_ilce_"];
+    makes.iter().any(|make| name.starts_with(make))
+        && ["_r", "_g", "_b"].iter().any(|end| name.ends_with(end))
+}
+
+/// η and k of the metals, and of the crystals among them, that pbrt 4 names: its measured spectra as Rec.709 colours of
+/// factors, seen under D65. Fresnel's equations make of them the colour that the spectra reflect, to 0.03.
+const METALS: [(&str, Rgb, Rgb); 7] = [
+    ("Ag", [0.1285, 0.1235, 0.1509], [4.0649, 3.2863, 2.3917]),
+    ("Al", [1.4074, 0.9267, 0.5840], [7.7404, 6.6026, 5.3603]),
+    ("Au", [0.0801, 0.4047, 1.5614], [3.3905, 2.5038, 1.7709]),
+    ("Cu", COPPER.0, COPPER.1),
+    ("CuZn", [0.4184, 0.5199, 1.1231], [3.6678, 2.6808, 1.7710]),
+    ("MgO", [1.7337, 1.7409, 1.7535], [0.0, 0.0, 0.0]),
+    ("TiO2", [2.8604, 2.9565, 3.1855], [0.0001, 0.0, 0.0006]),
+];
+
+/// Copper, of which metals are if nothing else is said.
+pub(super) const COPPER: (Rgb, Rgb) = ([0.1045, 0.9782, 1.2047], [3.2733, 2.5924, 2.3692]);
+
+/// Glasses that pbrt 4 names, at 587.6 nm. What it calls F5, F10 and F11 is Schott's SF5, SF10 and SF11.
 const GLASSES: [(&str, f32); 7] = [
     ("glass-BK7", 1.5168),
     ("glass-BAF10", 1.670),
     ("glass-FK51A", 1.4866),
     ("glass-LASF9", 1.8503),
-    ("glass-F5", 1.6034),
-    ("glass-SF10", 1.7283),
-    ("glass-SF11", 1.7847),
+    ("glass-F5", 1.6727),
+    ("glass-F10", 1.7283),
+    ("glass-F11", 1.7847),
 ];

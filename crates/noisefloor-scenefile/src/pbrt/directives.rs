@@ -2,7 +2,7 @@
 
 use super::arguments::Arguments;
 use super::params::Params;
-use super::reader::{MAX_DEPTH, Reader};
+use super::reader::{BOUNCES, MAX_DEPTH, Reader};
 use super::state::{Definition, Look, Object};
 use crate::colour::ColourSpace;
 use crate::error::{LoadError, Place};
@@ -24,6 +24,9 @@ const NO_OPTION_OF_PICTURES: [&str; 12] = [
     "seed",
     "wavefront",
 ];
+
+/// What `Attribute` gives parameters to.
+const TARGETS: [&str; 5] = ["shape", "light", "material", "medium", "texture"];
 
 /// Directives of a kind in quotes and parameters.
 const WITH_PARAMS: [&str; 17] = [
@@ -87,6 +90,7 @@ impl Reader<'_> {
             "Texture" => {
                 let (name, values, class) = (args.text()?, args.text()?, args.text()?);
                 let params = args.params()?.in_space(self.state.colour_space);
+                let params = self.with_defaults("texture", params)?;
                 let result = self.texture(&name, &values, &class, &params);
                 self.errors.take(result)?;
                 self.say_unused(&params, &format!("{word} \"{class}\""));
@@ -153,8 +157,12 @@ impl Reader<'_> {
                 self.shape(kind, &params)?;
                 self.say_unused(&params, &called);
             }
-            "Material" => self.state.material = Look::Given(self.definition(kind, params)),
+            "Material" => {
+                let params = self.with_defaults("material", params)?;
+                self.state.material = Look::Given(self.definition(kind, params));
+            }
             "MakeNamedMaterial" => {
+                let params = self.with_defaults("material", params)?;
                 let class = params.text("type")?.unwrap_or_default().to_owned();
                 let definition = self.definition(&class, params);
                 self.named_materials.insert(kind.to_owned(), definition);
@@ -168,9 +176,13 @@ impl Reader<'_> {
                 if kind != "diffuse" && kind != "area" {
                     return Err(params.place.clone().unsupported(called));
                 }
+                let params = self.with_defaults("light", params)?;
                 self.state.area_light = self.area_light(&params)?.map(Rc::new);
             }
             "Attribute" => {
+                if !TARGETS.contains(&kind) {
+                    return Err(params.bad(format!("{called}: it is for {}", TARGETS.join(", "))));
+                }
                 let all = self.with_defaults(kind, params)?;
                 self.state.defaults.insert(kind.to_owned(), Rc::new(all));
             }
@@ -206,8 +218,9 @@ impl Reader<'_> {
                 self.say_unused(params, called);
             }
             "Integrator" => {
-                self.max_depth =
-                    params.count("maxdepth")?.map(|d| u32::try_from(d).unwrap_or(u32::MAX - 1) + 1);
+                // One more segment than bounces
+                let bounces = params.count("maxdepth")?.unwrap_or(u64::from(BOUNCES));
+                self.max_depth = u32::try_from(bounces).unwrap_or(u32::MAX).saturating_add(1);
                 if !matches!(kind, "path" | "volpath" | "simplepath" | "simplevolpath" | "bdpt") {
                     let what = format!("the integrator `{kind}` is replaced by path tracing");
                     self.approximated(&params.place, what);

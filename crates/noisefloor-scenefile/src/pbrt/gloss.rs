@@ -30,7 +30,7 @@ impl Reader<'_> {
         alphas: &mut Option<Texture>,
     ) -> Result<f32, LoadError> {
         let both = self.grey(d, &format!("{prefix}roughness"), missing)?;
-        let side = |name: &str| {
+        let mut side = |name: &str| {
             let name = format!("{prefix}{name}");
             if d.params.get(&name).is_some() { self.grey(d, &name, missing) } else { Ok(both.clone()) }
         };
@@ -51,14 +51,6 @@ impl Reader<'_> {
         let [u, v, _] = self.means.of(&found);
         *alphas = Some(found).filter(|found| u != v || !matches!(found, Texture::Colour(_)));
         Ok((u * v).max(0.0).sqrt().min(1.0))
-    }
-
-    /// A number or a texture of numbers.
-    fn grey(&self, d: &Definition, name: &str, missing: f64) -> Result<Texture, LoadError> {
-        match d.params.get(name).map(|p| p.kind.as_str()) {
-            Some("texture") => self.colour(d, name, [missing as f32; 3]),
-            _ => Ok(Texture::Colour([d.params.float(name)?.unwrap_or(missing) as f32; 3])),
-        }
     }
 
     fn joined<const N: usize>(

@@ -27,14 +27,14 @@ impl Reader<'_> {
             "distant" => {
                 let (from, to) = (point("from", DVec3::ZERO)?, point("to", DVec3::Z)?);
                 let illuminance = asked("illuminance")?.unwrap_or(1.0);
-                let irradiance = self.times(illuminance, self.light(params, "L")?);
+                let irradiance = times(illuminance, self.light(params, "L")?);
                 let direction = array((to - from).normalize_or_zero());
                 self.builder.punctual(Punctual::Distant { direction, irradiance }).map_err(refused)
             }
             "point" => {
                 let position = array(point("from", DVec3::ZERO)?);
                 let intensity = asked("power")?.map_or(1.0, |power| power / (4.0 * PI));
-                let intensity = self.times(intensity, self.light(params, "I")?);
+                let intensity = times(intensity, self.light(params, "I")?);
                 self.builder.punctual(Punctual::Point { position, intensity }).map_err(refused)
             }
             "spot" => {
@@ -45,7 +45,7 @@ impl Reader<'_> {
                 // The solid angle of the inner cone, and half of that between both
                 let cone = 2.0 * PI * ((1.0 - start) + (start - end) / 2.0);
                 let intensity = asked("power")?.map_or(1.0, |power| power / cone);
-                let intensity = self.times(intensity, self.light(params, "I")?);
+                let intensity = times(intensity, self.light(params, "I")?);
                 let (inner, outer) = (inner.clamp(0.0, 0.999 * outer) as f32, outer as f32);
                 let direction = array((to - from).normalize_or_zero());
                 let position = array(from);
@@ -66,7 +66,7 @@ impl Reader<'_> {
         let refused = Self::refused(&params.place);
         params.ignore(&["samples", "nsamples"]);
         let illuminance = self.photometric(params, "illuminance")?;
-        let radiance = self.exposed(self.light(params, "L")?);
+        let radiance = self.light(params, "L")?;
         let name = match params.text("filename")? {
             Some(name) => Some(name),
             None => params.text("mapname")?,
@@ -157,7 +157,7 @@ impl Reader<'_> {
         if picture.is_some() && params.get("L").is_some() {
             return Err(params.bad("an area light has either `L` or a `filename`"));
         }
-        let mut radiance = self.exposed(self.light(params, "L")?);
+        let mut radiance = self.light(params, "L")?;
         let (mut texture, mut mean) = (None, 1.0);
         if let Some(name) = picture {
             let (width, height, mut pixels) = self.linear_picture(params, name)?;
@@ -189,14 +189,8 @@ impl Reader<'_> {
         }
         Ok(params.float(name)?.filter(|asked| *asked > 0.0))
     }
+}
 
-    /// Light as the film takes it, `by` times as much.
-    fn times(&self, by: f64, light: Rgb) -> Rgb {
-        self.exposed(light).map(|c| (f64::from(c) * by) as f32)
-    }
-
-    /// Light as the film takes it.
-    fn exposed(&self, light: Rgb) -> Rgb {
-        light.map(|c| c * self.view.exposure)
-    }
+fn times(by: f64, light: Rgb) -> Rgb {
+    light.map(|c| (f64::from(c) * by) as f32)
 }

@@ -1,7 +1,9 @@
 //! Materials of pbrt 3 and 4.
 
+use super::colours::COPPER;
 use super::reader::Reader;
 use super::state::{Definition, Height, Look, plain};
+use super::textures::Named;
 use crate::error::{LoadError, Place};
 use noisefloor::Rgb;
 use noisefloor_ptwne::{
@@ -158,13 +160,17 @@ impl Reader<'_> {
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
                 let (base, roughness) =
                     (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, 0.0, true, alphas)?);
-                self.plastic(base, [1.0; 3], self.index(d, 1.5)?, roughness)
+                plastic(base, [1.0; 3], self.index(d, 1.5)?, roughness)
             }
             "plastic" | "uber" | "substrate" | "translucent" => self.lobes(d, alphas)?.into(),
             "conductor" | "metal" | "coatedconductor" => self.conductor(d, alphas)?,
-            "mirror" => Material::Mirror { reflectance: self.means.of(&self.colour(d, "Kr", [0.9; 3])?) },
+            "mirror" => {
+                let reflectance = self.colour(d, "Kr", [0.9; 3])?;
+                Material::Mirror { reflectance: self.means.of(&reflectance) }
+            }
             "dielectric" | "glass" | "thindielectric" => {
-                let tint = self.means.of(&self.colour(d, "Kt", [1.0; 3])?);
+                let tint = self.colour(d, "Kt", [1.0; 3])?;
+                let tint = self.means.of(&tint);
                 if self.texture_or_colour(d, "Kr")?.is_some_and(|k| self.means.of(&k) != [1.0; 3]) {
                     let what = format!("`Kr` of the material `{}` is taken for 1", d.kind);
                     self.approximated(&d.params.place, what);
@@ -190,7 +196,8 @@ impl Reader<'_> {
                 self.approximated(&d.params.place, near("a coat on a Lambertian base"));
                 d.params.ignore(&["sigma_a", "sigma_s", "mfp", "scale", "g", "name"]);
                 let roughness = self.roughness(d, 0.0, true, alphas)?;
-                self.plastic(self.colour(d, "Kd", [0.5; 3])?, [1.0; 3], self.index(d, 1.33)?, roughness)
+                let name = if d.kind == "subsurface" { "reflectance" } else { "Kd" };
+                plastic(self.colour(d, name, [0.5; 3])?, [1.0; 3], self.index(d, 1.33)?, roughness)
             }
             "interface" | "none" | "" => return Ok(Made::Nothing),
             "mix" => return self.mix(d),
@@ -233,11 +240,6 @@ impl Reader<'_> {
         })
     }
 
-    fn plastic(&self, diffuse: Texture, specular: Rgb, ior: f32, roughness: f32) -> Material {
-        let ior = ior.clamp(1.001, 4.0);
-        Material::Plastic { diffuse, specular, ior, roughness, nonlinear: true }
-    }
-
     fn conductor(&mut self, d: &Definition, alphas: &mut Option<Texture>) -> Result<Material, LoadError> {
         if d.kind == "coatedconductor" {
             self.approximated(&d.params.place, "the coat of a conductor is left out");
@@ -257,10 +259,13 @@ impl Reader<'_> {
         let name = |name: &str| format!("{prefix}{name}");
         let missing = if d.kind == "metal" { 0.01 } else { 0.0 };
         let roughness = self.roughness_of(d, prefix, missing, d.kind != "metal", alphas)?;
-        if let Some(reflectance) = self.texture_or_colour(d, &name("reflectance"))? {
+        // The reflectance is without prefix (`CoatedConductorMaterial::Create`)
+        if let Some(reflectance) = self.texture_or_colour(d, "reflectance")? {
             return Ok(Material::RoughConductor { reflectance, roughness });
         }
-        let copper = crate::indices::conductor("Cu").unwrap_or(([0.2, 0.9, 1.1], [3.9, 2.5, 2.1]));
+        // Version 3 takes the colours of spectra under an equal-energy white, as Mitsuba does
+        let old = crate::indices::conductor("Cu").filter(|_| d.kind == "metal");
+        let copper = old.unwrap_or(COPPER);
         let eta = self.metal_index(d, &name("eta"))?.unwrap_or(copper.0);
         let k = self.metal_index(d, &name("k"))?.unwrap_or(copper.1);
         Ok(Material::Conductor { eta, k, reflectance: [1.0; 3].into(), roughness })
@@ -292,36 +297,55 @@ impl Reader<'_> {
     }
 
     /// A colour or texture in 0…1.
-    pub(super) fn colour(&self, d: &Definition, name: &str, missing: Rgb) -> Result<Texture, LoadError> {
+    pub(super) fn colour(&mut self, d: &Definition, name: &str, missing: Rgb) -> Result<Texture, LoadError> {
         Ok(self.texture_or_colour(d, name)?.unwrap_or(Texture::Colour(missing)))
     }
 
-    pub(super) fn texture_or_colour(&self, d: &Definition, name: &str) -> Result<Option<Texture>, LoadError> {
+    pub(super) fn texture_or_colour(
+        &mut self,
+        d: &Definition,
+        name: &str,
+    ) -> Result<Option<Texture>, LoadError> {
+        self.texture_of(d, name, [&d.colour_textures, &d.float_textures])
+    }
+
+    /// A number or a texture of numbers, in 0…1.
+    pub(super) fn grey(&mut self, d: &Definition, name: &str, missing: f64) -> Result<Texture, LoadError> {
+        match d.params.get(name).map(|p| p.kind.as_str()) {
+            Some("texture") => {
+                let found = self.texture_of(d, name, [&d.float_textures, &d.colour_textures])?;
+                Ok(found.unwrap_or(Texture::Colour([missing as f32; 3])))
+            }
+            _ => Ok(Texture::Colour([d.params.float(name)?.unwrap_or(missing) as f32; 3])),
+        }
+    }
+
+    /// A colour, or the texture that is called so: pbrt has two lists of them, which may share names.
+    fn texture_of(
+        &mut self,
+        d: &Definition,
+        name: &str,
+        lists: [&Named; 2],
+    ) -> Result<Option<Texture>, LoadError> {
         let Some(param) = d.params.get(name) else { return Ok(None) };
         if param.kind == "texture" {
             let called = d.params.text(name)?.unwrap_or_default();
-            let found = d.colour_textures.get(called).or_else(|| d.float_textures.get(called)).cloned();
-            let missing = || d.params.bad(format!("there is no texture `{called}`"));
-            return found.map(Some).ok_or_else(missing);
+            let found = lists.into_iter().find_map(|list| list.get(called)).cloned();
+            let found = found.ok_or_else(|| d.params.bad(format!("there is no texture `{called}`")))?;
+            return self.inside(&d.params.place, found).map(Some);
         }
         Ok(self.factor(&d.params, name)?.map(plain))
     }
 
     /// A number; of a texture its mean.
     pub(super) fn number(&mut self, d: &Definition, name: &str, missing: f64) -> Result<f64, LoadError> {
-        match d.params.get(name).map(|p| p.kind.as_str()) {
-            None => Ok(missing),
-            Some("texture") => {
-                self.approximated(
-                    &d.params.place,
-                    format!("the texture of `{name}` is replaced by its mean"),
-                );
-                let colour =
-                    self.texture_or_colour(d, name)?.map_or([0.5; 3], |texture| self.means.of(&texture));
-                Ok(f64::from(colour.iter().sum::<f32>() / 3.0))
-            }
-            Some(_) => Ok(d.params.float(name)?.unwrap_or(missing)),
+        if d.params.get(name).is_none_or(|p| p.kind != "texture") {
+            return Ok(d.params.float(name)?.unwrap_or(missing));
         }
+        let what = format!("the texture of `{name}` is replaced by its mean");
+        self.approximated(&d.params.place, what);
+        let texture = self.grey(d, name, missing)?;
+        Ok(f64::from(self.means.of(&texture).iter().sum::<f32>() / 3.0))
     }
 
     /// The index of refraction: a number or a named glass.
@@ -333,6 +357,11 @@ impl Reader<'_> {
         }
         Ok(missing)
     }
+}
+
+fn plastic(diffuse: Texture, specular: Rgb, ior: f32, roughness: f32) -> Material {
+    let ior = ior.clamp(1.001, 4.0);
+    Material::Plastic { diffuse, specular, ior, roughness, nonlinear: true }
 }
 
 /// A phrase for a warning.

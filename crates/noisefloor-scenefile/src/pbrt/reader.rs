@@ -13,7 +13,7 @@ use crate::loaded::{Loaded, title};
 use crate::options::LoadOptions;
 use flate2::read::GzDecoder;
 use glam::DMat4;
-use noisefloor_ptwne::{MaterialId, ObjectId, SceneBuilder, SceneError};
+use noisefloor_ptwne::{MaterialId, ObjectId, Pixels, SceneBuilder, SceneError};
 use std::collections::{HashMap, HashSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -21,6 +21,8 @@ use std::rc::Rc;
 
 /// How deep files may include each other, and transforms nest.
 pub(super) const MAX_DEPTH: u32 = 64;
+/// Longest path of the integrators, in bounces.
+pub(super) const BOUNCES: u32 = 5;
 /// Most bytes of all files of directives, and most files, where those that are included more than once count as
 /// often: a sponge of instances (shadeops/pbrt-v4-menger) has 160,000 files of 3.5 kB. Empty ones count no bytes, and
 /// files that include others twice would have 2⁶⁴.
@@ -55,11 +57,14 @@ pub(super) struct Reader<'a> {
     /// The object that is being defined.
     pub(super) open_object: Option<(String, Vec<Part>)>,
     pub(super) surrounded: bool,
-    pub(super) max_depth: Option<u32>,
+    pub(super) max_depth: u32,
     pub(super) pixels: u64,
     /// Of materials in materials, and of all work.
     pub(super) bounds: Bounds,
     pub(super) means: Means,
+    /// Pixels with a factor above 1, by address and factor, and what they are where 1 is the most. The former stay here,
+    /// so that no other ones get their address.
+    pub(super) bounded: HashMap<(usize, [u32; 3]), (Pixels, Pixels)>,
     /// Triangles that are not in the file but made of what is.
     pub(super) made: u64,
     pub(super) stack: Vec<State>,
@@ -95,10 +100,11 @@ impl<'a> Reader<'a> {
             balls: HashMap::new(),
             open_object: None,
             surrounded: false,
-            max_depth: None,
+            max_depth: BOUNCES + 1,
             pixels: 0,
             bounds: Bounds::default(),
             means: Means::default(),
+            bounded: HashMap::new(),
             made: 0,
             stack: vec![],
             transforms: vec![],
@@ -218,8 +224,7 @@ impl<'a> Reader<'a> {
         builder.optics(view.optics()).map_err(&refused)?;
         let scene = builder.build().map_err(&refused)?;
         let scene = scene.with_camera(view.to_camera()).map_err(&refused)?.with_identity(folder.contents());
-        // One more segment than bounces
-        Ok(Loaded { scene, size: Some(view.size()), max_depth, clamp: view.clamp, warnings })
+        Ok(Loaded { scene, size: Some(view.size()), max_depth: Some(max_depth), clamp: view.clamp, warnings })
     }
 }
 

@@ -36,14 +36,17 @@ impl Reader<'_> {
         let shines = light.as_ref().is_some_and(|light| !light.emission.two_sided);
         let pictured = light.as_ref().is_some_and(|light| light.emission.texture.is_some());
         let turned = self.state.reversed && (shines || in_object);
-        let partial = ["zmin", "zmax", "phimax"].iter().any(|name| params.get(name).is_some());
-        let place = params.place.clone();
-        let (to_world, radius) = (self.state.to_world, positive(params, "radius", 1.0));
-        let round = kind == "sphere" && !turned && !partial && !pictured;
-        let form = if round && (in_object || ball(to_world, 1.0).is_some()) {
-            Form::Ball(to_world, radius?)
-        } else if round && !self.state.reversed && light.is_none() {
-            return self.ellipsoid(to_world * DMat4::from_scale(DVec3::splat(radius?)), material, &place);
+        let (place, to_world) = (params.place.clone(), self.state.to_world);
+        let whole = if kind == "sphere" && !turned && !pictured { whole_sphere(params)? } else { None };
+        let form = if let Some(radius) = whole
+            && (in_object || ball(to_world, 1.0).is_some())
+        {
+            Form::Ball(to_world, radius)
+        } else if let Some(radius) = whole
+            && !self.state.reversed
+            && light.is_none()
+        {
+            return self.ellipsoid(to_world * DMat4::from_scale(DVec3::splat(radius)), material, &place);
         } else {
             let mesh = self.mesh(kind, params)?;
             if mesh.indices.is_empty() {
@@ -127,7 +130,7 @@ impl Reader<'_> {
             let name = params.text("alpha")?.unwrap_or_default();
             let found = self.state.float_textures.get(name).cloned();
             let texture = found.ok_or_else(|| params.bad(format!("there is no texture `{name}`")))?;
-            return Ok(Some((name.to_owned(), texture)));
+            return Ok(Some((name.to_owned(), self.inside(&params.place, texture)?)));
         }
         let alpha = params.float("alpha")?.unwrap_or(1.0).clamp(0.0, 1.0) as f32;
         Ok((alpha < 1.0).then(|| (alpha.to_string(), Texture::Colour([alpha; 3]))))
@@ -220,6 +223,16 @@ fn parts_of(kind: &str, form: &Form) -> usize {
         ("bilinearmesh", Form::Mesh(mesh)) => mesh.indices.len() / 2,
         _ => 1,
     }
+}
+
+/// The radius of a sphere of which nothing is cut off.
+fn whole_sphere(params: &Params) -> Result<Option<f64>, LoadError> {
+    let radius = positive(params, "radius", 1.0)?;
+    let number = |name: &str, missing: f64| Ok::<_, LoadError>(params.float(name)?.unwrap_or(missing));
+    let whole = number("zmin", -radius)? <= -radius
+        && number("zmax", radius)? >= radius
+        && number("phimax", 360.0)? >= 360.0;
+    Ok(whole.then_some(radius))
 }
 
 /// The area of a shape where it is.

@@ -3,8 +3,8 @@
 use super::params::Params;
 use super::reader::Reader;
 use super::state::{Definition, Height, plain};
-use crate::channels::linear;
-use crate::error::LoadError;
+use crate::channels::{self, linear};
+use crate::error::{LoadError, Place};
 use crate::picture::{self, Samples};
 use noisefloor::{Rgb, display::srgb_decode};
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
@@ -22,9 +22,13 @@ impl Reader<'_> {
         class: &str,
         params: &Params,
     ) -> Result<(), LoadError> {
-        let floats = values == "float";
-        let known =
-            if floats { self.state.float_textures.clone() } else { self.state.colour_textures.clone() };
+        let floats = match values {
+            "float" => true,
+            "spectrum" | "color" => false,
+            _ => return Err(params.bad(format!("a texture is of `float` or `spectrum`, not of `{values}`"))),
+        };
+        let (numbers, colours) = (self.state.float_textures.clone(), self.state.colour_textures.clone());
+        let known = if floats { &numbers } else { &colours };
         let mut height = None;
         let texture = match class {
             "imagemap" => {
@@ -32,23 +36,31 @@ impl Reader<'_> {
                 height = Some(map);
                 texture
             }
-            "constant" => plain(self.factor(params, "value")?.unwrap_or([1.0; 3])),
+            "constant" => Texture::Colour(self.factor(params, "value")?.unwrap_or([1.0; 3])),
+            // Version 3 multiplies two of a kind, version 4 by a number
             "scale" => {
-                let (first, second) =
-                    if params.get("tex").is_some() { ("tex", "scale") } else { ("tex1", "tex2") };
+                let old = params.get("tex1").or_else(|| params.get("tex2")).is_some();
+                let ((first, second), by) =
+                    if old { (("tex1", "tex2"), known) } else { (("tex", "scale"), &numbers) };
                 height = self.scaled_height(params, [first, second])?;
-                let first = self.operand(params, first, &known)?;
-                let second = self.operand(params, second, &known)?;
+                let first = self.operand(params, first, 1.0, known)?;
+                let second = self.operand(params, second, 1.0, by)?;
                 self.product(params, first, second)?
             }
-            "checkerboard" => self.checkerboard(params, &known)?,
+            "checkerboard" => self.checkerboard(params, known)?,
             "mix" | "directionmix" => {
-                let (first, second) =
-                    (self.operand(params, "tex1", &known)?, self.operand(params, "tex2", &known)?);
-                let amount = params.float("amount").ok().flatten().unwrap_or(0.5) as f32;
-                self.approximated(&params.place, "a mixed texture is replaced by its mean");
-                let (a, b) = (self.means.of(&first), self.means.of(&second));
-                plain(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * amount))
+                let first = self.operand(params, "tex1", 0.0, known)?;
+                let second = self.operand(params, "tex2", 1.0, known)?;
+                let amount = if class == "mix" {
+                    self.operand(params, "amount", 0.5, &numbers)?
+                } else {
+                    params.ignore(&["dir"]);
+                    self.approximated(&params.place, "a mix by direction is half of each");
+                    Texture::Colour([0.5; 3])
+                };
+                self.combined(params, [&first, &second, &amount], |[a, b, t]| {
+                    std::array::from_fn(|i| (1.0 - t[i]) * a[i] + t[i] * b[i])
+                })?
             }
             _ => {
                 self.approximated(
@@ -59,8 +71,8 @@ impl Reader<'_> {
                 plain([0.5; 3])
             }
         };
-        // Not shared with it any more, so that nothing is copied below
-        drop(known);
+        // Not shared with them any more, so that nothing is copied below
+        drop((numbers, colours));
         if floats && self.state.heights.contains_key(name) {
             Rc::make_mut(&mut self.state.heights).remove(name);
         }
@@ -77,9 +89,16 @@ impl Reader<'_> {
     }
 
     fn checkerboard(&mut self, params: &Params, known: &Named) -> Result<Texture, LoadError> {
-        let first = self.operand(params, "tex1", known)?;
-        let second = self.operand(params, "tex2", known)?;
-        let (a, b) = (self.means.of(&first), self.means.of(&second));
+        let [first, second] = [("tex1", 1.0), ("tex2", 0.0)].map(|(name, missing)| {
+            let texture = self.operand(params, name, missing, known)?;
+            if matches!(texture, Texture::Image(_)) {
+                let what =
+                    format!("the picture on squares of a checkerboard, `{name}`, is replaced by its mean");
+                self.approximated(&params.place, what);
+            }
+            self.inside(&params.place, texture)
+        });
+        let (a, b) = (self.means.of(&first?), self.means.of(&second?));
         let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([b, a, a, b])));
         // pbrt's squares have the size 1, a picture of ours has two
         let to_uv = self.uv_map(params)?.map(|row| row.map(|x| 0.5 * x));
@@ -89,15 +108,20 @@ impl Reader<'_> {
         Ok(Texture::Image(ImageTexture { to_uv, nearest: true, ..image }))
     }
 
-    /// A colour, a number or a named texture.
-    fn operand(&mut self, params: &Params, name: &str, known: &Named) -> Result<Texture, LoadError> {
-        let missing = [1.0; 3];
+    /// A colour, a number or a texture of those that are known, and otherwise a grey.
+    fn operand(
+        &mut self,
+        params: &Params,
+        name: &str,
+        missing: f32,
+        known: &Named,
+    ) -> Result<Texture, LoadError> {
         if params.get(name).is_some_and(|p| p.kind == "texture") {
             let called = params.text(name)?.unwrap_or_default();
             let found = known.get(called).cloned();
             return found.ok_or_else(|| params.bad(format!("there is no texture `{called}`")));
         }
-        Ok(Texture::Colour(self.factor(params, name)?.unwrap_or(missing)))
+        Ok(Texture::Colour(self.factor(params, name)?.unwrap_or([missing; 3])))
     }
 
     /// The heights of a product: those of one texture, times a number.
@@ -126,32 +150,49 @@ impl Reader<'_> {
         first: Texture,
         second: Texture,
     ) -> Result<Texture, LoadError> {
+        let times = |[a, b]: [Rgb; 2]| std::array::from_fn(|i| a[i] * b[i]);
         Ok(match (first, second) {
-            (Texture::Colour(a), Texture::Colour(b)) => plain(std::array::from_fn(|i| a[i] * b[i])),
             (Texture::Image(image), Texture::Colour(colour))
-            | (Texture::Colour(colour), Texture::Image(image)) => self.scaled(params, image, colour)?,
-            (Texture::Image(image), other) => {
-                self.approximated(
-                    &params.place,
-                    "of a product of two pictures the second is replaced by its mean",
-                );
-                self.scaled(params, image, self.means.of(&other))?
+            | (Texture::Colour(colour), Texture::Image(image)) => {
+                Texture::Image(ImageTexture { factor: times([image.factor, colour]), ..image })
             }
-            // This reader makes no others
-            (other, _) => other,
+            (first, second) => self.combined(params, [&first, &second], times)?,
         })
     }
 
-    /// A picture times a colour. What exceeds 1 is 1.
-    fn scaled(&mut self, params: &Params, image: ImageTexture, by: Rgb) -> Result<Texture, LoadError> {
-        if by.iter().all(|c| (0.0..=1.0).contains(c)) {
-            let factor = std::array::from_fn(|i| image.factor[i] * by[i]);
-            return Ok(Texture::Image(ImageTexture { factor, ..image }));
+    /// Textures as one, whose pixels `put` makes of theirs.
+    fn combined<const N: usize>(
+        &mut self,
+        params: &Params,
+        parts: [&Texture; N],
+        put: impl Fn([Rgb; N]) -> Rgb,
+    ) -> Result<Texture, LoadError> {
+        let (texture, replaced) = channels::combined(parts, |texture| self.means.of(texture), put);
+        if replaced {
+            self.approximated(&params.place, "a second texture of another layout is replaced by its mean");
         }
-        self.count_pixels(&params.place, image.width * image.height)?;
-        let scaled = |p: Rgb| std::array::from_fn(|i| (p[i] * image.factor[i] * by[i]).clamp(0.0, 1.0));
-        let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(scaled).collect());
-        Ok(Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..image }))
+        if let Texture::Image(image) = &texture {
+            self.count_pixels(&params.place, image.width * image.height)?;
+        }
+        Ok(texture)
+    }
+
+    /// A texture as a factor on light: what exceeds 1 is 1.
+    pub(super) fn inside(&mut self, place: &Place, texture: Texture) -> Result<Texture, LoadError> {
+        Ok(match texture {
+            Texture::Colour(colour) => plain(colour),
+            Texture::Image(image) if image.factor.iter().any(|c| *c > 1.0) => {
+                let key = (channels::address(&image.pixels), image.factor.map(f32::to_bits));
+                if !self.bounded.contains_key(&key) {
+                    self.count_pixels(place, image.width * image.height)?;
+                    let bounded = channels::mapped(&image, |p| p).pixels;
+                    self.bounded.insert(key, (image.pixels, bounded));
+                }
+                let (_, pixels) = &self.bounded[&key];
+                Texture::Image(ImageTexture { pixels: pixels.clone(), factor: [1.0; 3], ..image })
+            }
+            other => other,
+        })
     }
 
     /// A picture as a texture, and as heights.
@@ -196,7 +237,8 @@ impl Reader<'_> {
             return Ok((Texture::Image(ImageTexture { pixels, ..image }), height));
         }
         let height = Height { map: image.clone(), scale };
-        Ok((self.scaled(params, image, [scale; 3])?, height))
+        let factor = [scale.max(0.0); 3];
+        Ok((Texture::Image(ImageTexture { factor, ..image }), height))
     }
 }
 

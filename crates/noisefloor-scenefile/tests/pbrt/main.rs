@@ -3,6 +3,9 @@
 /// What is broken or not supported, and where.
 #[cfg(test)]
 mod bad;
+/// What is taken where a parameter is not given.
+#[cfg(test)]
+mod defaults;
 /// Damaged files are errors or scenes, never a panic.
 #[cfg(test)]
 mod hostile;

@@ -1,0 +1,360 @@
+//! What pbrt takes where a parameter is not given: pbrt-v4 5f7a606 and pbrt-v3 13d871f, the `Create` of each thing.
+
+use crate::util::Folder;
+use noisefloor::{ProgressiveSource, Request, Rgb, TileGrid};
+use noisefloor_ptwne::{Ptwne, RenderOptions};
+use noisefloor_scenefile::{LoadOptions, Loaded};
+
+/// A view of the origin from aside, and lights from there and from all around.
+const VIEW: &str = "LookAt 2 3 4  0 0 0  0 0 1 Camera \"perspective\" \"float fov\" 40\n";
+const LIT: &str = "LightSource \"distant\" \"point3 from\" [1 3 2] \"point3 to\" [0 0 0] \"rgb L\" [3 2 1]\n\
+    LightSource \"infinite\" \"rgb L\" [.3 .4 .5]\n";
+const BALL: &str = "Shape \"sphere\"\n";
+/// A square from −1 to 1 whose front is +z, with texture coordinates from 0 to 2.
+const SQUARE: &str = "Shape \"trianglemesh\" \"integer indices\" [0 1 2 0 2 3] \
+    \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] \"point2 uv\" [0 0 2 0 2 2 0 2]\n";
+
+/// What a directive with `{}` shows, before and after it other ones.
+fn sketch(folder: &Folder, text: &str) -> (Vec<Rgb>, Option<(usize, usize)>, Option<u32>) {
+    let loaded = folder.load_with(text, &LoadOptions::default()).unwrap_or_else(|e| panic!("{text}: {e}"));
+    let Loaded { scene, size, max_depth, clamp, .. } = loaded;
+    let options = RenderOptions { clamp, max_depth: 4, ..RenderOptions::default() };
+    let mut source = Ptwne::new(scene, 12, 12, options).unwrap();
+    let tile = TileGrid::new(12, 12, 64).unwrap().tile(0);
+    (source.sample(&[Request::new(tile, 0, 16)]).unwrap().remove(0).mean, size, max_depth)
+}
+
+/// In `text`, a parameter that has its default changes nothing, and one that has another value does: else the row
+/// would show nothing.
+fn check(folder: &Folder, text: &str, default: &str, other: &str) -> Option<String> {
+    let seen = |parameter: &str| sketch(folder, &text.replace("{}", parameter));
+    let absent = seen("");
+    if absent != seen(default) {
+        return Some(format!("{default} is not what is taken in {text}"));
+    }
+    (absent == seen(other)).then(|| format!("{other} changes nothing in {text}"))
+}
+
+/// Parameters of shapes, with their defaults and other values.
+#[test]
+fn shapes_have_the_defaults_of_pbrt() {
+    let (folder, mut wrong) = (Folder::new(), vec![]);
+    for (shape, rows) in [
+        (
+            "Shape \"sphere\" {}",
+            &[
+                ("float radius", "1", ".7"),
+                ("float zmin", "-1", "-.3"),
+                ("float zmax", "1", ".3"),
+                ("float phimax", "360", "200"),
+                ("float alpha", "1", ".5"),
+            ][..],
+        ),
+        (
+            "Shape \"cylinder\" {}",
+            &[
+                ("float radius", "1", ".7"),
+                ("float zmin", "-1", "-.3"),
+                ("float zmax", "1", ".3"),
+                ("float phimax", "360", "200"),
+            ],
+        ),
+        (
+            "Shape \"disk\" {}",
+            &[
+                ("float height", "0", ".3"),
+                ("float radius", "1", ".7"),
+                ("float innerradius", "0", ".3"),
+                ("float phimax", "360", "200"),
+            ],
+        ),
+        (
+            "Shape \"cone\" {}",
+            &[("float radius", "1", ".7"), ("float height", "1", ".3"), ("float phimax", "360", "200")],
+        ),
+        (
+            "Shape \"paraboloid\" {}",
+            &[
+                ("float radius", "1", ".7"),
+                ("float zmin", "0", ".3"),
+                ("float zmax", "1", ".6"),
+                ("float phimax", "360", "200"),
+            ],
+        ),
+        (
+            "Shape \"hyperboloid\" {}",
+            &[
+                ("point p1", "0 0 0", ".5 0 0"),
+                ("point p2", "1 1 1", "1 1 .5"),
+                ("float phimax", "360", "200"),
+            ],
+        ),
+        (
+            "Shape \"loopsubdiv\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 1 -1 1 0] \"integer indices\" [0 1 2 0 2 3] {}",
+            &[("integer levels", "3", "1"), ("integer nlevels", "3", "1")],
+        ),
+        (
+            "Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 1] {}",
+            &[("integer indices", "0 1 2", "0 1 1")],
+        ),
+        (
+            "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0] {}",
+            &[("integer indices", "0 1 2 3", "0 1 2 1")],
+        ),
+    ] {
+        for (parameter, default, other) in rows {
+            let [default, other] = [default, other].map(|value| format!("\"{parameter}\" [{value}]"));
+            wrong.extend(check(&folder, &format!("{VIEW}WorldBegin {LIT}{shape}"), &default, &other));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+/// Parameters of materials.
+#[test]
+fn materials_have_the_defaults_of_pbrt() {
+    let (folder, mut wrong) = (Folder::new(), vec![]);
+    // Of each kind, with what is needed for parameters to matter
+    for (material, parameter, default, other) in [
+        ("diffuse", "rgb reflectance", ".5 .5 .5", ".5 .2 .5"),
+        ("matte", "rgb Kd", ".5 .5 .5", ".5 .2 .5"),
+        ("matte", "float sigma", "0", "30"),
+        ("coateddiffuse", "rgb reflectance", ".5 .5 .5", ".5 .2 .5"),
+        ("coateddiffuse", "float roughness", "0", ".3"),
+        ("coateddiffuse", "float eta", "1.5", "1.2"),
+        ("plastic", "rgb Kd", ".25 .25 .25", ".5 .2 .5"),
+        ("plastic", "rgb Ks", ".25 .25 .25", ".5 .2 .5"),
+        ("plastic", "float roughness", ".1", ".3"),
+        ("plastic", "bool remaproughness", "true", "false"),
+        ("uber", "rgb Kd", ".25 .25 .25", ".5 .2 .5"),
+        ("uber", "rgb Ks", ".25 .25 .25", ".5 .2 .5"),
+        ("uber", "rgb Kr", "0 0 0", ".5 .2 .5"),
+        ("uber", "rgb opacity", "1 1 1", ".5 .5 .5"),
+        ("uber", "float roughness", ".1", ".3"),
+        ("uber", "float index", "1.5", "1.2"),
+        ("substrate", "rgb Kd", ".5 .5 .5", ".5 .2 .5"),
+        ("substrate", "rgb Ks", ".5 .5 .5", ".5 .2 .5"),
+        ("substrate", "float uroughness", ".1", ".3"),
+        ("substrate", "float vroughness", ".1", ".3"),
+        ("translucent", "rgb Kd", ".25 .25 .25", ".5 .2 .5"),
+        ("translucent", "rgb Ks", ".25 .25 .25", ".5 .2 .5"),
+        ("translucent", "rgb reflect", ".5 .5 .5", ".5 .2 .5"),
+        ("translucent", "rgb transmit", ".5 .5 .5", ".5 .2 .5"),
+        ("translucent", "float roughness", ".1", ".3"),
+        ("metal", "float roughness", ".01", ".3"),
+        ("metal", "bool remaproughness", "true", "false"),
+        ("mirror", "rgb Kr", ".9 .9 .9", ".5 .2 .5"),
+        ("glass", "rgb Kt", "1 1 1", ".5 .2 .5"),
+        ("glass", "float index", "1.5", "1.2"),
+        ("glass", "float eta", "1.5", "1.2"),
+        ("glass", "float uroughness", "0", ".3"),
+        ("dielectric", "float eta", "1.5", "1.2"),
+        ("dielectric", "float roughness", "0", ".3"),
+        ("thindielectric", "float eta", "1.5", "1.2"),
+        ("conductor", "spectrum eta", "\"metal-Cu-eta\"", "\"metal-Au-eta\""),
+        ("conductor", "spectrum k", "\"metal-Cu-k\"", "\"metal-Au-k\""),
+        ("conductor", "float roughness", "0", ".3"),
+        ("conductor\" \"float roughness\" .3 \"float vroughness", "bool remaproughness", "true", "false"),
+        ("coatedconductor", "spectrum conductor.eta", "\"metal-Cu-eta\"", "\"metal-Au-eta\""),
+        ("coatedconductor", "spectrum conductor.k", "\"metal-Cu-k\"", "\"metal-Au-k\""),
+        ("coatedconductor", "float conductor.roughness", "0", ".3"),
+        ("diffusetransmission", "rgb reflectance", ".25 .25 .25", ".5 .2 .5"),
+        ("diffusetransmission", "rgb transmittance", ".25 .25 .25", ".5 .2 .5"),
+        ("diffusetransmission", "float scale", "1", ".5"),
+        ("subsurface", "float eta", "1.33", "1.5"),
+        ("subsurface", "float roughness", "0", ".3"),
+        ("kdsubsurface", "rgb Kd", ".5 .5 .5", ".5 .2 .5"),
+        ("kdsubsurface", "float eta", "1.33", "1.5"),
+        ("disney", "rgb color", ".5 .5 .5", ".5 .2 .5"),
+        ("disney", "float metallic", "0", ".5"),
+        ("disney", "float eta", "1.5", "1.2"),
+        ("disney", "float roughness", ".5", ".3"),
+        ("disney", "float anisotropic", "0", ".5"),
+        ("disney\" \"rgb color\" [.5 .2 .5] \"float sheen", "float sheentint", ".5", "0"),
+        ("disney\" \"rgb color\" [.5 .2 .5] \"float metallic", "float speculartint", "0", "1"),
+        ("disney", "float sheen", "0", "1"),
+        ("disney", "float clearcoat", "0", "1"),
+        ("disney\" \"float clearcoat", "float clearcoatgloss", "1", "0"),
+        ("disney", "float spectrans", "0", "1"),
+    ] {
+        // A kind that is followed by a parameter gets a value for it
+        let more = if !material.contains(' ') {
+            ""
+        } else if material.ends_with("metallic") {
+            " .1"
+        } else {
+            " 1"
+        };
+        let text = format!("{VIEW}WorldBegin {LIT}Material \"{material}\"{more} {{}}\n{BALL}");
+        let value = |value: &str| format!("\"{parameter}\" [{value}]");
+        wrong.extend(check(&folder, &text, &value(default), &value(other)));
+    }
+    let parts = "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [1 0 0]\n\
+        MakeNamedMaterial \"b\" \"string type\" \"diffuse\"\n";
+    for names in [
+        "\"string materials\" [\"a\" \"b\"]",
+        "\"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"b\"",
+    ] {
+        let text = format!("{VIEW}WorldBegin {LIT}{parts}Material \"mix\" {names} {{}}\n{BALL}");
+        wrong.extend(check(&folder, &text, "\"float amount\" .5", "\"float amount\" .3"));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+/// Parameters of textures of colours and of numbers: the latter as an opacity.
+#[test]
+fn textures_have_the_defaults_of_pbrt() {
+    let picture = image::RgbImage::from_fn(4, 4, |x, y| image::Rgb([60 * x as u8, 60 * y as u8, 30]));
+    let (folder, mut wrong) = (Folder::new(), vec![]);
+    picture.save(folder.path().join("a.png")).unwrap();
+    let file = "imagemap\" \"string filename\" \"a.png";
+    for (class, parameter, default, other) in [
+        ("constant", "value", "1", ".3"),
+        ("scale", "tex", "1", ".3"),
+        ("scale", "scale", "1", ".3"),
+        ("scale", "tex1", "1", ".3"),
+        ("scale", "tex2", "1", ".3"),
+        ("checkerboard", "tex1", "1", ".3"),
+        ("checkerboard", "tex2", "0", ".3"),
+        ("checkerboard", "integer dimension", "2", ""),
+        ("checkerboard", "string mapping", "\"uv\"", ""),
+        ("checkerboard", "float uscale", "1", ".3"),
+        ("checkerboard", "float vscale", "1", ".3"),
+        ("checkerboard", "float udelta", "0", ".3"),
+        ("checkerboard", "float vdelta", "0", ".3"),
+        ("mix", "tex1", "0", ".3"),
+        ("mix", "tex2", "1", ".3"),
+        ("mix", "float amount", ".5", ".3"),
+        ("directionmix", "tex1", "0", ".3"),
+        ("directionmix", "tex2", "1", ".3"),
+        (file, "float scale", "1", ".3"),
+        (file, "float scale", "1", "3"),
+        (file, "bool invert", "false", "true"),
+        (file, "bool gamma", "true", "false"),
+        (file, "string encoding", "\"sRGB\"", "\"linear\""),
+        (file, "string wrap", "\"repeat\"", "\"clamp\""),
+        (file, "string filter", "\"bilinear\"", "\"point\""),
+        (file, "float uscale", "1", ".3"),
+    ] {
+        for kind in ["float", "spectrum"] {
+            // An operand is of the texture's kind, but for the factor of version 4
+            let own = match (kind, parameter) {
+                ("spectrum", "value" | "tex" | "tex1" | "tex2") => Some("rgb"),
+                (_, "value" | "tex" | "tex1" | "tex2" | "scale") => Some("float"),
+                _ => None,
+            };
+            let value = |value: &str| match own {
+                Some("rgb") => format!("\"rgb {parameter}\" [{value} {value} {value}]"),
+                Some(own) => format!("\"{own} {parameter}\" [{value}]"),
+                None => format!("\"{parameter}\" [{value}]"),
+            };
+            let surface = match kind {
+                "float" => {
+                    SQUARE.replace("\"integer indices\"", "\"texture alpha\" \"t\" \"integer indices\"")
+                }
+                _ => format!("Material \"diffuse\" \"texture reflectance\" \"t\"\n{SQUARE}"),
+            };
+            let text = format!("{VIEW}WorldBegin {LIT}Texture \"t\" \"{kind}\" \"{class}\" {{}}\n{surface}");
+            // Of some no other value is read as pbrt does
+            let other = if other.is_empty() { "\"float udelta\" .3".to_owned() } else { value(other) };
+            wrong.extend(check(&folder, &text, &value(default), &other));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+/// Parameters of lights.
+#[test]
+fn lights_have_the_defaults_of_pbrt() {
+    let (folder, mut wrong) = (Folder::new(), vec![]);
+    let above = "\"point3 from\" [0 0 2] \"point3 to\" [0 0 0]";
+    for (light, parameter, default, other) in [
+        ("LightSource \"point\" \"point3 from\" [0 0 2]", "rgb I", "1 1 1", "1 2 1"),
+        ("LightSource \"point\" \"point3 from\" [0 0 2]", "float scale", "1", "2"),
+        ("LightSource \"point\" \"point3 from\" [0 0 2]", "float power", "-1", "2"),
+        ("Translate 0 0 2 LightSource \"point\"", "point3 from", "0 0 0", "0 1 0"),
+        (&format!("LightSource \"distant\" {above}"), "rgb L", "1 1 1", "1 2 1"),
+        (&format!("LightSource \"distant\" {above}"), "float scale", "1", "2"),
+        (&format!("LightSource \"distant\" {above}"), "float illuminance", "-1", "2"),
+        ("LightSource \"distant\" \"point3 to\" [0 0 -1]", "point3 from", "0 0 0", "0 1 0"),
+        ("Rotate 180 1 0 0 LightSource \"distant\"", "point3 to", "0 0 1", "0 1 1"),
+        (&format!("LightSource \"spot\" {above}"), "rgb I", "1 1 1", "1 2 1"),
+        (&format!("LightSource \"spot\" {above}"), "float scale", "1", "2"),
+        (&format!("LightSource \"spot\" {above}"), "float power", "-1", "2"),
+        (&format!("LightSource \"spot\" {above}"), "float coneangle", "30", "20"),
+        (&format!("LightSource \"spot\" {above}"), "float conedeltaangle", "5", "10"),
+        ("Translate 0 0 2 LightSource \"spot\" \"point3 to\" [0 0 -1]", "point3 from", "0 0 0", "0 1 0"),
+        ("Translate 0 0 2 Rotate 180 1 0 0 LightSource \"spot\"", "point3 to", "0 0 1", "0 1 1"),
+        ("LightSource \"infinite\"", "rgb L", "1 1 1", "1 2 1"),
+        ("LightSource \"infinite\"", "float scale", "1", "2"),
+        ("LightSource \"infinite\"", "float illuminance", "-1", "2"),
+        ("AreaLightSource \"diffuse\"", "rgb L", "1 1 1", "1 2 1"),
+        ("AreaLightSource \"diffuse\"", "float scale", "1", "2"),
+        ("AreaLightSource \"diffuse\"", "float power", "-1", "2"),
+        ("ReverseOrientation AreaLightSource \"diffuse\"", "bool twosided", "false", "true"),
+    ] {
+        let text = format!("{VIEW}WorldBegin AttributeBegin {light} {{}}\n{SQUARE}AttributeEnd {SQUARE}");
+        // The square beside an area light is not in its way
+        let text = if light.contains("Area") {
+            text.replace("AttributeEnd", "AttributeEnd Translate 0 0 -1")
+        } else {
+            text
+        };
+        let text = if light.starts_with("AreaLight") || light.starts_with("Reverse") {
+            text
+        } else {
+            // Only the square outside is seen
+            text.replace(&format!("\n{SQUARE}AttributeEnd"), "\nAttributeEnd")
+        };
+        let value = |value: &str| format!("\"{parameter}\" [{value}]");
+        wrong.extend(check(&folder, &text, &value(default), &value(other)));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+/// Parameters of how the picture is taken.
+#[test]
+fn cameras_and_films_have_the_defaults_of_pbrt() {
+    let (folder, mut wrong) = (Folder::new(), vec![]);
+    let look_at = "LookAt 2 3 4  0 0 0  0 0 1";
+    for (setup, parameter, default, other) in [
+        ("Camera \"perspective\" {}", "float fov", "90", "40"),
+        ("Camera \"perspective\" {}", "float lensradius", "0", "1"),
+        ("Camera \"perspective\" \"float lensradius\" .1 {}", "float focaldistance", "1e6", "3"),
+        (
+            "Film \"rgb\" \"integer yresolution\" 1280 {} Camera \"perspective\"",
+            "float screenwindow",
+            "-1 1 -1 1",
+            "-2 2 -2 2",
+        ),
+        (
+            "Film \"rgb\" \"integer yresolution\" 1280 {} Camera \"orthographic\"",
+            "float screenwindow",
+            "-1 1 -1 1",
+            "-2 2 -2 2",
+        ),
+        ("Film \"rgb\" {} Camera \"perspective\"", "integer xresolution", "1280", "400"),
+        ("Film \"rgb\" {} Camera \"perspective\"", "integer yresolution", "720", "400"),
+        ("Film \"rgb\" {} Camera \"perspective\"", "float iso", "100", "200"),
+        ("Film \"rgb\" {} Camera \"perspective\"", "float exposuretime", "1", "2"),
+        ("Film \"image\" {} Camera \"perspective\"", "float scale", "1", "2"),
+        ("Film \"rgb\" {} Camera \"perspective\"", "float cropwindow", "0 1 0 1", "0 .5 0 .5"),
+        ("Film \"rgb\" {} Camera \"perspective\"", "float maxcomponentvalue", "1e30", ".1"),
+        ("Integrator \"volpath\" {} Camera \"perspective\"", "integer maxdepth", "5", "3"),
+        ("Integrator \"path\" {} Camera \"perspective\"", "integer maxdepth", "5", "3"),
+    ] {
+        // A window is the camera's
+        let setup = if parameter == "float screenwindow" {
+            format!("{} {{}}", setup.replace("{} ", ""))
+        } else {
+            setup.to_owned()
+        };
+        let text = format!("{look_at} {setup} WorldBegin {LIT}{BALL}");
+        let value = |value: &str| format!("\"{parameter}\" [{value}]");
+        wrong.extend(check(&folder, &text, &value(default), &value(other)));
+    }
+    // Without an integrator pbrt has one of five bounces
+    let (_, _, depth) = sketch(&folder, &format!("{VIEW}WorldBegin {LIT}{BALL}"));
+    assert_eq!(depth, Some(6));
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
