@@ -401,7 +401,7 @@ fn tone_mappings_of_ones_own_judge_as_in_rust() {
         let (a, b) = (render(whole, 0, 16), render(whole, 1, 16));
         let pixels = [&a, &b].map(|picture| picture.as_chunks().0.to_vec());
         let pair = PicturePair::new((WIDTH, HEIGHT), pixels, 128.0).unwrap();
-        let (in_rust, _) = pair.noise(&Oracle::bundled(), &rust.with_tile(64)).unwrap();
+        let in_rust = pair.look(&Oracle::bundled(), &rust.with_tile(64), None).unwrap().excess;
         let (mut oracle, mut excess) = (null_mut(), NfExcess::default());
         // SAFETY: living handles, arrays of the sizes given, and variables of this function.
         unsafe {

@@ -6,9 +6,9 @@ use crate::oracle::NfOracle;
 use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard, set_last_warnings};
 use noisefloor::stills::StillError;
-use noisefloor::tune::{Ending, Excess, Knob, KnobError, Next, PairError, PicturePair, Tuning};
+use noisefloor::tune::{Ending, Excess, Knob, KnobError, Looked, Next, PairError, PicturePair, Tuning};
 use noisefloor::{Params, Rgb, internal::check_image};
-use noisefloor_denoise::{DenoisedError, DenoisedHalves};
+use noisefloor_denoise::DenoisedError;
 use std::sync::{Mutex, PoisonError};
 
 /// The search goes on.
@@ -188,10 +188,9 @@ pub unsafe extern "C" fn nf_excess(
         let (params, [a, b]) = unsafe { pictures(params, (width, height), [a, b], floats) }?;
         let size = (width as usize, height as usize);
         let pair = PicturePair::new(size, [a, b], UNKNOWN_SPP).map_err(unfit)?;
-        notice(&pair, &params)?;
-        let (found, _) = pair.noise(&oracle.0, &params).map_err(odd)?;
+        let looked = pair.look(&oracle.0, &params, None);
         // SAFETY: promised by the caller.
-        unsafe { write(excess, found) }
+        unsafe { write(excess, looked) }
     })
 }
 
@@ -223,16 +222,10 @@ pub unsafe extern "C" fn nf_excess_denoised(
         // SAFETY: promised by the caller.
         let (params, [a, b, da, db]) = unsafe { pictures(params, (width, height), all, floats) }?;
         let size = (width as usize, height as usize);
-        let pair = PicturePair::new(size, [a.clone(), b.clone()], UNKNOWN_SPP).map_err(unfit)?;
-        notice(&pair, &params)?;
-        let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
-        let wrong = |error: &dyn std::error::Error| Failure::new(NfStatus::Size, error.to_string());
-        let compared = pair.compare(&params);
-        let error = DenoisedError::new(&halves, compared.display()).map_err(|error| wrong(&error))?;
-        let film = pair.film(&params)?;
-        let found = error.excess(&film, lost, &params.viewing).map_err(|error| wrong(&error))?.worst;
+        let pair = PicturePair::new(size, [a, b], UNKNOWN_SPP).map_err(unfit)?;
+        let looked = DenoisedError::look(&pair, [&da, &db], lost, &params, None).map(|(_, looked)| looked);
         // SAFETY: promised by the caller.
-        unsafe { write(excess, pair.tell_apart(found)) }
+        unsafe { write(excess, looked) }
     })
 }
 
@@ -250,16 +243,9 @@ fn odd(error: PairError) -> Failure {
         PairError::Still(error) => unfit(error),
         PairError::Size(error) => error.into(),
         PairError::Criterion(error) => error.into(),
+        PairError::Judge(error) => Failure::new(NfStatus::Size, error.to_string()),
         other => Failure::new(NfStatus::Criterion, other.to_string()),
     }
-}
-
-/// Keeps what the pictures say against a verdict for [`nf_last_warnings`](crate::status::nf_last_warnings).
-fn notice(pair: &PicturePair, params: &Params) -> Result<(), Failure> {
-    set_last_warnings(&[]);
-    let warnings = pair.notice(params).map_err(odd)?;
-    set_last_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
-    Ok(())
 }
 
 /// Parameters, and copies of pictures.
@@ -290,9 +276,14 @@ unsafe fn pictures<const N: usize>(
     Ok((params, copies))
 }
 
+/// And keeps what the pictures say against a verdict for [`nf_last_warnings`](crate::status::nf_last_warnings).
+///
 /// # Safety
 /// As [`border::write`].
-unsafe fn write(place: *mut NfExcess, excess: Excess) -> Result<(), Failure> {
+unsafe fn write(place: *mut NfExcess, looked: Result<Looked, PairError>) -> Result<(), Failure> {
+    set_last_warnings(&[]);
+    let Looked { excess, warnings, .. } = looked.map_err(odd)?;
+    set_last_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
     let Excess { ratio, place: at, pictures, alone, still, .. } = excess;
     let (x, y) = at.unwrap_or_default();
     let (alone, still) = (alone.unwrap_or(0.0), still.into());

@@ -60,7 +60,6 @@ pub use criterion::{
 };
 pub use denoiser::{AuxiliaryPictures, DenoiseError, Denoiser, NoisyPicture};
 pub use estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY};
-pub use excess::DenoisedExcess;
 pub use guides::{GuideError, Guides};
 pub use mirrored::{DenoisePasses, MirrorMean};
 #[cfg(feature = "oidn")]

@@ -7,10 +7,10 @@ use crate::params::PyParams;
 use crate::pool;
 use noisefloor::stills::StillWarning;
 use noisefloor::tune::{
-    Ending, Excess, Knob, Look, Next, PairError, PicturePair, Search, Tuning, crops_for, most_in_squares,
+    Ending, Excess, Knob, Look, Looked, Next, PairError, PicturePair, Search, Tuning, crops_for,
 };
 use noisefloor::{Oracle, Params, Rgb, Tile, Viewing};
-use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError, DenoisedExcess, DenoisedHalves};
+use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError};
 use noisefloor_vision::VisionModel;
 use numpy::PyArray2;
 use pyo3::exceptions::PyUserWarning;
@@ -419,28 +419,20 @@ fn compare(
     let unfit = |error| match error {
         PairError::Still(error) => error.raise(),
         PairError::Size(error) => error.raise(),
+        PairError::Judge(error) => PictureError::new_err(error.to_string()),
         other => CriterionError::new_err(other.to_string()),
     };
-    let Some([da, db]) = denoised else {
-        let warnings = pair.notice(params).map_err(unfit)?;
-        let (excess, map) = pair.noise(oracle, params).map_err(unfit)?;
-        let squares = most_in_squares(size, &map);
-        return Ok((PyExcess { excess, size, left: Left::Map(map), squares }, warnings));
+    let (looked, left) = match denoised {
+        None => {
+            let mut looked = pair.look(oracle, params, None).map_err(unfit)?;
+            let map = std::mem::take(&mut looked.map);
+            (looked, Left::Map(map))
+        }
+        Some([a, b]) => {
+            let (error, looked) = DenoisedError::look(&pair, [&a, &b], lost, params, None).map_err(unfit)?;
+            (looked, Left::Denoised(Box::new(error.of_shape_alone()), params.viewing))
+        }
     };
-    let failed = |error: &dyn std::error::Error| PictureError::new_err(error.to_string());
-    let compared = pair.compare(params);
-    let halves = DenoisedHalves { size, noisy: pair.halves(), denoised: [&da, &db] };
-    // Each has moments in which one thread works alone
-    let (warnings, (error, film)) = rayon::join(
-        || pair.notice(params),
-        || rayon::join(|| DenoisedError::new(&halves, compared.display()), || pair.film(params)),
-    );
-    let warnings = warnings.map_err(unfit)?;
-    let error = error.map_err(|error| failed(&error))?;
-    let film = film.map_err(Raise::raise)?;
-    let found = error.excess(&film, lost, &params.viewing).map_err(|error| failed(&error))?;
-    let DenoisedExcess { worst, squares, .. } = found;
-    let excess = pair.tell_apart(worst);
-    let left = Left::Denoised(Box::new(error.of_shape_alone()), params.viewing);
+    let Looked { excess, squares, warnings, .. } = looked;
     Ok((PyExcess { excess, size, left, squares }, warnings))
 }

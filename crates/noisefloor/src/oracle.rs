@@ -279,6 +279,21 @@ impl Oracle {
         described.map(|tile| Some(LastDescribed { tile, spread, met_once, lacked: None }))
     }
 
+    /// Judges all tiles of a picture, without a memory, and says how visible noise is at each of its pixels; `None` if the model
+    /// does not tell noise from picture.
+    pub(crate) fn judge_all(
+        &self,
+        view: &View<'_>,
+    ) -> Result<(Vec<Verdict>, Option<Vec<f32>>), CriterionError> {
+        let tiles: Vec<Tile> = view.film.grid().tiles().collect();
+        let seen: Vec<Option<LastDescribed>> = self.look_at(view, &tiles)?.collect();
+        let Judged { verdicts, described } = self.judge_seen(view, &seen, &tiles)?;
+        let audience = self.audience().then(view.audience);
+        let described: Vec<Described> = described.into_iter().flatten().collect();
+        let map = self.map_noise(view.film.grid(), &described, audience);
+        Ok((verdicts.into_iter().map(|(verdict, _)| verdict).collect(), map))
+    }
+
     /// Judges tiles of a picture: those that only light could keep open, with the light that they are likely to
     /// lack.
     fn judge_seen(
@@ -570,12 +585,7 @@ impl StoppingCriterion for Oracle {
     }
 
     fn visible_noise(&self, view: &View<'_>) -> Option<Vec<f32>> {
-        let tiles: Vec<Tile> = view.film.grid().tiles().collect();
-        let seen: Vec<Option<LastDescribed>> = self.look_at(view, &tiles).ok()?.collect();
-        let Judged { described, .. } = self.judge_seen(view, &seen, &tiles).ok()?;
-        let audience = self.audience().then(view.audience);
-        let described: Vec<Described> = described.into_iter().flatten().collect();
-        self.map_noise(view.film.grid(), &described, audience)
+        self.judge_all(view).ok()?.1
     }
 
     /// Tiles that are not named count for the picture as they were when last described; they are described

@@ -24,9 +24,10 @@
 
 mod search;
 
-pub use search::{CROP, Look, Looked, Search, Viewer, crops_for, drive};
+pub use search::{CROP, Look, Search, Viewer, crops_for, drive};
 
-use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
+use crate::criterion::{CriterionError, Verdict, View};
+use crate::display::Display;
 use crate::film::{Film, blend_row};
 use crate::oracle::Oracle;
 use crate::params::Params;
@@ -311,7 +312,7 @@ pub fn squares((width, height): (usize, usize)) -> Vec<Tile> {
 }
 
 /// The most that a map, row-major, has in each of these squares; infinite where a number is missing or is none.
-pub fn most_in_squares(size: (usize, usize), map: &[f32]) -> Vec<(Tile, f64)> {
+fn most_in_squares(size: (usize, usize), map: &[f32]) -> Vec<(Tile, f64)> {
     let told =
         |pixel: usize| map.get(pixel).copied().filter(|number| !number.is_nan()).unwrap_or(f32::INFINITY);
     let most = |tile: &Tile| tile.rows(size.0).flatten().map(told).fold(0.0, f32::max);
@@ -342,6 +343,25 @@ pub enum PairError {
     /// The model cannot say how much noise is too much.
     #[error("a model with this descriptor does not tell noise from picture; the bundled model does")]
     NoMap,
+    /// What judges them otherwise than by their noise cannot.
+    #[error(transparent)]
+    Judge(Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// What was found of two pictures.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Looked {
+    /// In the worst place.
+    pub excess: Excess,
+    /// What is wrong in each of the picture's [`squares`], over what may be wrong there.
+    pub squares: Vec<(Tile, f64)>,
+    /// How visible noise is at each pixel of the mean, row-major, 1 where it is just what may be; empty if something else was judged.
+    pub map: Vec<f32>,
+    /// What is likely wrong with the pictures: verdicts come too early or too late.
+    pub warnings: Vec<StillWarning>,
+    /// How the pictures are displayed: with the exposure of the converged one.
+    pub display: Display,
 }
 
 impl PicturePair {
@@ -364,15 +384,6 @@ impl PicturePair {
         Ok(Self { mean: still(mean, 2.0 * spp), halves: [one, other] })
     }
 
-    /// What the two pictures say against a verdict on them, as [`SnapshotPair::notice`] has it.
-    ///
-    /// # Errors
-    /// [`PairError`] if they are no two pictures of one view, or no light.
-    pub fn notice(&self, params: &Params) -> Result<Vec<StillWarning>, PairError> {
-        let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
-        Ok(self.compare(params).notice(grid)?.warnings)
-    }
-
     /// Width and height.
     pub fn size(&self) -> (usize, usize) {
         self.mean.size
@@ -388,37 +399,24 @@ impl PicturePair {
         self.halves.each_ref().map(|half| half.pixels.as_slice())
     }
 
-    /// The mean, and the two pictures as its halves: a session that has them as the halves of its film judges the same,
-    /// to the bit. With the exposure of the converged picture.
-    pub fn compare(&self, params: &Params) -> SnapshotPair<'_> {
-        let [one, other] = &self.halves;
-        SnapshotPair::of_halves(&self.mean, [one, other], &params.tone_mapping).seen_on(params.viewing)
-    }
-
-    /// A film that has the two pictures as its halves.
-    ///
-    /// # Errors
-    /// [`TileError`] if there are no tiles of that edge.
-    pub fn film(&self, params: &Params) -> Result<Film, TileError> {
-        let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
-        Ok(film_of(self.halves.each_ref(), grid))
-    }
-
-    /// How far the noise of the mean is from what the share of people asked for does not see, and the map of
-    /// it, row-major, 1 where it is just that: as a session has it whose film has the two pictures as its halves, with
-    /// the light that they are likely not to have met, and with more samples wanted where noise is not trusted yet. What
-    /// is only likely to be wrong with the pictures is for [`PicturePair::notice`] to say.
+    /// How far the noise of the mean is from what the share of people asked for does not see: as a session has it whose film has
+    /// the two pictures as its halves, with the light that they are likely not to have met, and with more samples wanted
+    /// where noise is not trusted yet. `counts` are the samples of the pixels of both, where the renderer tells.
     ///
     /// # Errors
     /// [`PairError`], also if the pictures are no two of one view, or no light.
-    pub fn noise(&self, oracle: &Oracle, params: &Params) -> Result<(Excess, Vec<f32>), PairError> {
-        self.notice(params)?;
-        let (film, pair) = (self.film(params)?, self.compare(params));
-        let tiles: Vec<Tile> = film.grid().tiles().collect();
-        let (display, viewing) = (pair.display(), params.viewing);
+    pub fn look(
+        &self,
+        oracle: &Oracle,
+        params: &Params,
+        counts: Option<[&PixelCounts; 2]>,
+    ) -> Result<Looked, PairError> {
+        let (compared, film) = self.compare(params)?;
+        let warnings = compared.notice(film.grid())?.warnings;
+        let (display, viewing) = (compared.display(), params.viewing);
         let view = View { film: &film, display, viewing, audience: params.audience, reference: None };
-        let verdicts = oracle.clone().judge(&view, &tiles)?;
-        let map = oracle.visible_noise(&view).ok_or(PairError::NoMap)?;
+        let (verdicts, map) = oracle.judge_all(&view)?;
+        let map = map.ok_or(PairError::NoMap)?;
 
         let worst = (0..map.len()).max_by(|&a, &b| map[a].total_cmp(&map[b]));
         let ratio = worst.map_or(0.0, |worst| f64::from(map[worst]));
@@ -427,15 +425,53 @@ impl PicturePair {
         let doubted = verdicts.iter().filter(|verdict| verdict.doubted).map(wanted).fold(0.0, f64::max);
         let ratio = ratio.max((doubted / film.spp(0) as f64).sqrt());
         let place = worst.map(|worst| (worst % self.size().0, worst / self.size().0));
-        Ok((self.tell_apart(Excess { place, ..Excess::new(ratio) }), map))
+        let squares = most_in_squares(self.size(), &map);
+        let excess = self.known(Excess { place, ..Excess::new(ratio) }, &squares, counts);
+        Ok(Looked { excess, squares, map, warnings, display: display.clone() })
     }
 
-    /// An excess of these pictures with what is known of *one* whose threshold is finer by √2 ([`Excess::alone`],
-    /// [`Excess::still`]), by the samples that their pixels have. `squares` are those of the picture, with what is wrong in each.
+    /// The same by what `judge` finds in each of the picture's [`squares`], over what may be wrong there: of the pictures as
+    /// they are displayed, and of a film that has them as its halves. There is no map.
+    ///
+    /// # Errors
+    /// As [`PicturePair::look`], and those of `judge`.
+    pub fn look_by(
+        &self,
+        params: &Params,
+        counts: Option<[&PixelCounts; 2]>,
+        judge: impl FnOnce(&Display, &Film) -> Result<Vec<(Tile, f64)>, PairError> + Send,
+    ) -> Result<Looked, PairError> {
+        let (compared, film) = self.compare(params)?;
+        let display = compared.display();
+        // Each has moments in which one thread works alone
+        let (noticed, squares) = rayon::join(|| compared.notice(film.grid()), || judge(display, &film));
+        let (warnings, squares) = (noticed?.warnings, squares?);
+        let worst = squares.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let (ratio, place) = worst.map_or((0.0, None), |(square, ratio)| {
+            (*ratio, Some((square.x + square.width / 2, square.y + square.height / 2)))
+        });
+        let excess = self.known(Excess { place, ..Excess::new(ratio) }, &squares, counts);
+        Ok(Looked { excess, squares, map: Vec::new(), warnings, display: display.clone() })
+    }
+
+    /// The mean beside the two pictures as its halves, with the exposure of the converged picture; and a film that has these
+    /// halves.
+    fn compare(&self, params: &Params) -> Result<(SnapshotPair<'_>, Film), TileError> {
+        let [one, other] = &self.halves;
+        let grid = TileGrid::new(self.size().0, self.size().1, params.tile)?;
+        let compared = SnapshotPair::of_halves(&self.mean, [one, other], &params.tone_mapping);
+        Ok((compared.seen_on(params.viewing), film_of([one, other], grid)))
+    }
+
+    /// An excess of these pictures with what tells them from others, and with what is known of *one* whose threshold is finer by
+    /// √2 ([`Excess::alone`], [`Excess::still`]), by the samples that their pixels have. `squares` are those of the picture, with
+    /// what is wrong in each.
     ///
     /// Where pixels have more than the fewest samples and less than the most, their noise follows the threshold, and that
     /// picture is as good as the mean of both. What is worst in it need not be worst in the mean.
-    pub fn known(&self, excess: Excess, squares: &[(Tile, f64)], counts: [&PixelCounts; 2]) -> Excess {
+    fn known(&self, excess: Excess, squares: &[(Tile, f64)], counts: Option<[&PixelCounts; 2]>) -> Excess {
+        let excess = Excess { pictures: self.digest(), ..excess };
+        let Some(counts) = counts else { return excess };
         let grey = |[r, g, b]: Rgb| (f64::from(r) + f64::from(g) + f64::from(b)) / 3.0;
         let [one, other] = self.halves();
         let mean = self.mean().iter().map(|&pixel| grey(pixel)).sum::<f64>() / self.mean().len() as f64;
@@ -461,11 +497,6 @@ impl PicturePair {
             Some((alone, still)) => excess.with_alone(Some(alone)).with_still(still),
             None => excess,
         }
-    }
-
-    /// An excess of these pictures, with what tells them from those of other settings: [`Excess::pictures`].
-    pub fn tell_apart(&self, excess: Excess) -> Excess {
-        Excess { pictures: self.digest(), ..excess }
     }
 
     /// A number that follows from the pictures, whichever comes first (FNV-1a, of parts and then of their numbers); not 0.
@@ -776,7 +807,7 @@ mod tests {
             let samples = (0..size.0 * size.1).map(|i| if i % size.0 < 64 { left } else { right }).collect();
             let counts = PixelCounts { samples, fewest: 32.0, fewest_alone, most: 256.0 };
             let squares = [(square(0), ratios[0]), (square(64), ratios[1])];
-            let told = pair.known(Excess::new(ratios[0].max(ratios[1])), &squares, [&counts; 2]);
+            let told = pair.known(Excess::new(ratios[0].max(ratios[1])), &squares, Some([&counts; 2]));
             (told.alone.unwrap(), told.still)
         };
         let near = |(alone, still): (f64, bool), right: f64, stands: bool| {
@@ -791,7 +822,7 @@ mod tests {
         near(found(100.0, 256.0, 64.0, [2.0, 1.6]), 1.6 * SQRT_2, true);
         // Of one picture that is stopped early nothing but its own is known
         let nothing = PixelCounts { samples: Vec::new(), fewest: 32.0, fewest_alone: 64.0, most: 256.0 };
-        let told = pair.known(Excess::new(2.0), &[(square(0), 2.0)], [&nothing; 2]);
+        let told = pair.known(Excess::new(2.0), &[(square(0), 2.0)], Some([&nothing; 2]));
         assert_eq!(told.alone.map(|alone| (alone / SQRT_2 * 1e6).round()), Some(2e6));
     }
 
@@ -1039,7 +1070,7 @@ mod tests {
         let (oracle, params) = (Oracle::bundled(), Params::default().with_tile(64));
         let ratio = |sigma| {
             let pair = PicturePair::new((256, 256), [noisy(1, sigma), noisy(2, sigma)], 64.0).unwrap();
-            let (excess, map) = pair.noise(&oracle, &params).unwrap();
+            let Looked { excess, map, .. } = pair.look(&oracle, &params, None).unwrap();
             let (x, y) = excess.place.unwrap();
             // Windows reach over the border by half of their width
             assert!(x >= 112 && y >= 112, "{x}, {y}");

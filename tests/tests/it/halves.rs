@@ -3,7 +3,7 @@
 use noisefloor::{
     Oracle, Params, Rgb, Session, Stop, StopReason, StoppingCriterion, ToneMapping, Verdict,
     display::{Display, ToneCurve, ToneTable},
-    tune::PicturePair,
+    tune::{Looked, PicturePair},
 };
 use noisefloor_denoise::{DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
 use noisefloor_testkit::{Noise, bilateral};
@@ -202,15 +202,15 @@ fn two_pictures_are_two_halves() {
             let params = Params::default().with_tile(64).with_min_spp(128).with_tone_mapping(tone);
             let judge = |one: &[Rgb], other: &[Rgb]| {
                 let pair = PicturePair::new(SIZE, [one.to_vec(), other.to_vec()], 64.0).unwrap();
-                pair.noise(&Oracle::bundled(), &params).unwrap()
+                pair.look(&Oracle::bundled(), &params, None).unwrap()
             };
-            let (excess, map) = judge(&a, &b);
-            assert_eq!((excess, map.clone()), judge(&b, &a));
+            let looked = judge(&a, &b);
+            assert_eq!(looked, judge(&b, &a));
             let mut session = Session::new(SIZE.0, SIZE.1, Oracle::bundled(), params.clone()).unwrap();
             session.push_image(64, &a).unwrap();
             session.push_image(64, &b).unwrap();
             session.judge().unwrap();
-            assert_eq!(session.visible_noise().unwrap(), map);
+            assert_eq!(session.visible_noise().unwrap(), looked.map);
         }
     }
 }
@@ -229,7 +229,7 @@ fn two_pictures_are_guarded_as_a_session_is() {
         [(10, &clean, false), (24, &clean, false), (200, &clean, true), (200, &dotted, false)]
     {
         let pair = PicturePair::new(SIZE, [one.clone(), other.clone()], spp as f64).unwrap();
-        let (excess, map) = pair.noise(&Oracle::bundled(), &params).unwrap();
+        let Looked { excess, map, .. } = pair.look(&Oracle::bundled(), &params, None).unwrap();
         let mut session =
             Session::new(SIZE.0, SIZE.1, Oracle::bundled(), params.clone().with_min_spp(2)).unwrap();
         session.push_image(spp, one).unwrap();

@@ -2,8 +2,8 @@
 
 use crate::kit::{SIZE, Simple, noisy};
 use noisefloor::tune::PicturePair;
-use noisefloor::{Params, Rgb, Schedule, Session, Tile, Viewing, tile::TileGrid};
-use noisefloor_denoise::{DenoisedError, DenoisedHalves, DenoisedQuality, jods_lost_unmet};
+use noisefloor::{Film, Params, Rgb, Schedule, Session, Tile, Viewing, display::Display, tile::TileGrid};
+use noisefloor_denoise::{DenoisedError, DenoisedQuality, jods_lost_unmet};
 
 const SPP: u64 = 10;
 const LIMIT: f64 = 0.3;
@@ -25,9 +25,8 @@ fn pair_of(halves: &[Vec<Rgb>; 2]) -> PicturePair {
 
 /// Tiles that lose more than the limit by light that they are likely to lack.
 fn lacking(halves: &[Vec<Rgb>; 2]) -> Vec<usize> {
-    let (pair, params) = (pair_of(halves), params());
-    let lost =
-        jods_lost_unmet(&pair.film(&params).unwrap(), pair.compare(&params).display(), &Viewing::default());
+    let by_light = |display: &Display, film: &Film| Ok(jods_lost_unmet(film, display, &Viewing::default()));
+    let lost = pair_of(halves).look_by(&params(), None, by_light).unwrap().squares;
     lost.iter().filter(|(_, lost)| *lost > LIMIT).map(|(tile, _)| tile.index).collect()
 }
 
@@ -58,14 +57,8 @@ fn two_pictures_lack_what_a_session_of_their_halves_says() {
 fn light_that_one_picture_has_met_keeps_a_setting_from_being_found() {
     let flat = [0.3, 0.3001].map(|grey| Simple::Flat(grey).of(&noisy(1, 0.0)));
     let excess = |halves: [Vec<Rgb>; 2]| {
-        let (pair, params) = (pair_of(&halves), params());
-        let made = DenoisedHalves {
-            size: SIZE,
-            noisy: halves.each_ref().map(Vec::as_slice),
-            denoised: flat.each_ref().map(Vec::as_slice),
-        };
-        let error = DenoisedError::new(&made, pair.compare(&params).display()).unwrap();
-        error.excess(&pair.film(&params).unwrap(), LIMIT, &params.viewing).unwrap()
+        let denoised = flat.each_ref().map(Vec::as_slice);
+        DenoisedError::look(&pair_of(&halves), denoised, LIMIT, &params(), None).unwrap().1
     };
     let on_the_wall = |tile: &Tile| tile.x >= 96;
     let worst = |light: f32, exchanged: bool| {

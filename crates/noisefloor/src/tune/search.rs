@@ -23,9 +23,6 @@ pub struct Look {
     pub is_rendered: bool,
 }
 
-/// What was found of two pictures: in the worst place, and in their [`squares`](super::squares) if crops are wanted.
-pub type Looked = (Excess, Vec<(Tile, f64)>);
-
 /// Renders and judges the pictures that a search asks for. A closure that looks is one.
 pub trait Viewer {
     /// Why pictures cannot be rendered or judged.
@@ -36,7 +33,7 @@ pub trait Viewer {
     ///
     /// # Errors
     /// They end the search.
-    fn look(&mut self, look: &Look) -> Result<Looked, Self::Error>;
+    fn look(&mut self, look: &Look) -> Result<(Excess, Vec<(Tile, f64)>), Self::Error>;
 
     /// All looks with one setting are done, for now.
     ///
@@ -47,10 +44,10 @@ pub trait Viewer {
     }
 }
 
-impl<E, F: FnMut(&Look) -> Result<Looked, E>> Viewer for F {
+impl<E, F: FnMut(&Look) -> Result<(Excess, Vec<(Tile, f64)>), E>> Viewer for F {
     type Error = E;
 
-    fn look(&mut self, look: &Look) -> Result<Looked, E> {
+    fn look(&mut self, look: &Look) -> Result<(Excess, Vec<(Tile, f64)>), E> {
         self(look)
     }
 }

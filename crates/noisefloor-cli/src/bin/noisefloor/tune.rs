@@ -8,8 +8,8 @@ use crate::tune::pictures::{Crop, Judged, Judges, Pair, View};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{CROP, Ending, Excess, Look, Looked, Next, Search, Tuning, Viewer, drive};
-use noisefloor::{Audience, Oracle, Params, ToneMapping, Viewing};
+use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Tuning, Viewer, drive};
+use noisefloor::{Audience, Oracle, Params, Tile, ToneMapping, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::{note, say, say_json};
@@ -202,7 +202,7 @@ impl<'a> Tune<'a> {
 impl Viewer for Tune<'_> {
     type Error = anyhow::Error;
 
-    fn look(&mut self, look: &Look) -> anyhow::Result<Looked> {
+    fn look(&mut self, look: &Look) -> anyhow::Result<(Excess, Vec<(Tile, f64)>)> {
         let job = self.job;
         let view = &mut self.views[look.view];
         let mut what = format!("{} {}", job.tuning.knob().name(), look.setting);
@@ -235,12 +235,12 @@ impl Viewer for Tune<'_> {
         }
         if let Some(whole) = whole {
             // So many crops lie in so many views at the most, which are the worst
-            self.whole.push((judged.excess.ratio, look.view, whole));
+            self.whole.push((judged.looked.excess.ratio, look.view, whole));
             self.whole.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
             self.whole.truncate(job.regions);
         }
-        let found = (judged.excess, judged.squares.clone());
-        let worse = |worst: &(Look, Judged)| judged.excess.ratio > worst.1.excess.ratio;
+        let found = (judged.looked.excess, judged.looked.squares.clone());
+        let worse = |worst: &(Look, Judged)| judged.looked.excess.ratio > worst.1.looked.excess.ratio;
         // Crops of whole pictures are another look at the same
         if !look.is_rendered && self.worst.as_ref().is_none_or(worse) {
             self.worst = Some((*look, judged));
@@ -254,7 +254,7 @@ impl Viewer for Tune<'_> {
         let Some((look, judged)) = self.worst.take() else { return Ok(()) };
         // The last look at the whole, after crops, is no step of the search if it passes
         let step = search.tuning().steps().last().filter(|step| step.each == look.each);
-        let told = step.map_or(judged.excess, |step| step.excess);
+        let told = step.map_or(judged.looked.excess, |step| step.excess);
         self.rows.push(Row {
             setting: look.setting,
             each: look.each,
@@ -262,8 +262,8 @@ impl Viewer for Tune<'_> {
             alone: told.alone.filter(|alone| alone.is_finite()),
             still: told.still,
             frame: self.views[look.view].frame,
-            x: judged.excess.place.map(|(x, _)| x),
-            y: judged.excess.place.map(|(_, y)| y),
+            x: judged.looked.excess.place.map(|(x, _)| x),
+            y: judged.looked.excess.place.map(|(_, y)| y),
             crops: if look.crop.is_some() { job.regions } else { 0 },
             pictures: told.pictures,
             seconds: std::mem::take(&mut self.rendering).as_secs_f64(),

@@ -4,7 +4,7 @@ use super::Row;
 use super::pictures::Judged;
 use crate::output::ERROR_SCALE;
 use anyhow::{Context, bail};
-use noisefloor::{Rgb, source::SourceIdentity};
+use noisefloor::{Rgb, source::SourceIdentity, tune::Looked};
 use noisefloor_cli::files::write_json;
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::refuse;
@@ -71,7 +71,8 @@ impl Keep {
     /// Writes the pictures of a step.
     pub fn write_pictures(&self, judged: &Judged) -> anyhow::Result<()> {
         let path = |name: &str| self.0.path().join(name);
-        let Judged { size: (width, height), mean, denoised, display, map, spp, .. } = judged;
+        let Judged { looked, size: (width, height), mean, denoised, spp } = judged;
+        let Looked { display, map, .. } = looked;
         let spp = spp.map(|spp| spp as u64);
         let facts = SampleFacts { samples: spp.map(|spp| (spp, spp)), origin: None };
         let layers = RenderLayers { facts: Some(&facts), ..RenderLayers::rgb(*width, *height, mean) };

@@ -3,18 +3,15 @@
 use super::{TuneCriterion, TuneJob};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::display::Display;
 use noisefloor::source::SourceIdentity;
 use noisefloor::stills::{StillError, StillWarning};
-use noisefloor::tune::{Excess, Knob, PicturePair, PixelCounts, most_in_squares};
+use noisefloor::tune::{Knob, Looked, PicturePair, PixelCounts};
 use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
 use noisefloor_cli::options::denoiser::filter_plan;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::{Opened, Resources, Source, SourceJob, SourceKind};
-use noisefloor_denoise::{
-    DenoisedError, DenoisedExcess, DenoisedHalves, Denoiser, Guides, NoisyPicture, Oidn,
-};
+use noisefloor_denoise::{DenoisedError, Denoiser, Guides, NoisyPicture, Oidn};
 use noisefloor_sidecar::ThresholdCommand;
 use noisefloor_vision::VisionModel;
 use std::fs::File;
@@ -68,17 +65,13 @@ pub struct Crop {
 
 /// What was found of a pair, and the picture that people would look at.
 pub struct Judged {
-    pub excess: Excess,
+    /// The worst place in the whole picture; the map is of noise, 1 is the limit, or of JODs lost.
+    pub looked: Looked,
     pub size: (usize, usize),
     /// Mean of both, as rendered.
     pub mean: Vec<Rgb>,
     /// That denoised, if it was to be.
     pub denoised: Option<Vec<Rgb>>,
-    pub display: Display,
-    /// What is left: noise, 1 is the limit; or JODs lost.
-    pub map: Vec<f32>,
-    /// How far each square is from what may be seen there.
-    pub squares: Vec<(Tile, f64)>,
     /// Samples per pixel of the mean.
     pub spp: Option<f64>,
 }
@@ -304,7 +297,7 @@ impl<'a> Judges<'a> {
     pub fn tone(&self, whole: &Judged) -> ToneMapping {
         match &self.params.tone_mapping {
             ToneMapping::Reinhard { white, .. } => {
-                ToneMapping::ReinhardAt { exposure: whole.display.exposure(), white: *white }
+                ToneMapping::ReinhardAt { exposure: whole.looked.display.exposure(), white: *white }
             }
             other => other.clone(),
         }
@@ -342,36 +335,16 @@ impl<'a> Judges<'a> {
             params.tone_mapping = crop.tone.clone();
         }
         let guides = guides.map(|guides| crop.map_or_else(|| guides.clone(), |crop| guides.part(crop.tile)));
-        // In the whole picture
-        let in_whole = |excess: Excess| {
-            let (x, y) = crop.map_or((0, 0), |crop| (crop.tile.x, crop.tile.y));
-            excess.at(excess.place.map(|place| (place.0 + x, place.1 + y)))
-        };
-        let halves = PicturePair::new(size, pictures.clone(), spp.unwrap_or(128.0));
-        let halves = halves.map_err(|error| match error {
+        let pair = PicturePair::new(size, pictures, spp.unwrap_or(128.0));
+        let pair = pair.map_err(|error| match error {
             StillError::Same => anyhow::anyhow!(
                 "two pictures of different seeds are the same: the renderer does not look at the seed, \
                  or the scene has no noise"
             ),
             other => other.into(),
         })?;
-        let compared = halves.compare(&params);
-        for warning in halves.notice(&params)? {
-            let known = |known: &StillWarning| discriminant(known) == discriminant(&warning);
-            if !self.warned.iter().any(known) {
-                note!("warning: {warning}");
-                self.warned.push(warning);
-            }
-        }
-        // Of one picture, as far as the samples of pixels tell
-        let known = |excess: Excess, squares: &[(Tile, f64)]| match &counts {
-            Some(counts) => halves.known(excess, squares, counts.each_ref()),
-            None => excess,
-        };
-        let display = compared.display().clone();
-        let spp = spp.map(|each| 2.0 * each);
-        let mean = halves.mean().to_vec();
-        match (self.criterion, &mut self.denoiser) {
+        let counts = counts.as_ref().map(|counts| counts.each_ref());
+        let (mut looked, denoised) = match (self.criterion, &mut self.denoiser) {
             (TuneCriterion::Denoised { lost, .. }, Some(denoiser)) => {
                 let wants = denoiser.wants();
                 let (hits, clean) = match &guides {
@@ -385,24 +358,26 @@ impl<'a> Judges<'a> {
                     let picture = NoisyPicture::new(size, pixels);
                     hits[of].as_ref().map_or(picture, |hits| picture.guided(hits, clean, wants))
                 };
-                let noisy = [pictures[0].as_slice(), &pictures[1]];
-                let [a, b] = denoiser.denoise_both([&guided(noisy[0], 0), &guided(noisy[1], 1)])?;
-                let error =
-                    DenoisedError::new(&DenoisedHalves { size, noisy, denoised: [&a, &b] }, &display)?;
-                let film = halves.film(&params)?;
-                let DenoisedExcess { worst, squares, .. } = error.excess(&film, *lost, &params.viewing)?;
-                let map = error.map_of_jods_lost(&VisionModel::new(&params.viewing))?;
-                let excess = known(in_whole(halves.tell_apart(worst)), &squares);
-                let denoised = Some(denoiser.denoise(&guided(&mean, 2))?);
-                Ok(Judged { excess, size, mean, denoised, display, map, squares, spp })
+                let [a, b] = pair.halves();
+                let [a, b] = denoiser.denoise_both([&guided(a, 0), &guided(b, 1)])?;
+                let (error, mut looked) = DenoisedError::look(&pair, [&a, &b], *lost, &params, counts)?;
+                looked.map = error.map_of_jods_lost(&VisionModel::new(&params.viewing))?;
+                (looked, Some(denoiser.denoise(&guided(pair.mean(), 2))?))
             }
-            (TuneCriterion::Noise(oracle), _) => {
-                let (excess, map) = halves.noise(oracle, &params)?;
-                let squares = most_in_squares(size, &map);
-                let excess = known(in_whole(excess), &squares);
-                Ok(Judged { excess, size, mean, denoised: None, display, map, squares, spp })
-            }
+            (TuneCriterion::Noise(oracle), _) => (pair.look(oracle, &params, counts)?, None),
             (TuneCriterion::Denoised { .. }, None) => bail!("the denoiser was not started"),
+        };
+        for &warning in &looked.warnings {
+            let known = |known: &StillWarning| discriminant(known) == discriminant(&warning);
+            if !self.warned.iter().any(known) {
+                note!("warning: {warning}");
+                self.warned.push(warning);
+            }
         }
+        // In the whole picture
+        let (x, y) = crop.map_or((0, 0), |crop| (crop.tile.x, crop.tile.y));
+        looked.excess = looked.excess.at(looked.excess.place.map(|place| (place.0 + x, place.1 + y)));
+        let mean = pair.mean().to_vec();
+        Ok(Judged { looked, size, mean, denoised, spp: spp.map(|each| 2.0 * each) })
     }
 }
