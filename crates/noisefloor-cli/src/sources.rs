@@ -360,6 +360,7 @@ fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
     }
     noisefloor_scenefile::load_with(path, options).map_err(|error| match (&error, elsewhere(path)) {
         (LoadError::Format { .. }, Some(advice)) => Usage(format!("{}: {advice}", path.display())).into(),
+        (LoadError::LeftOut { .. }, _) => Usage(error.to_string()).into(),
         _ => error.into(),
     })
 }

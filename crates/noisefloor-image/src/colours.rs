@@ -1,5 +1,7 @@
 //! Colours that a file states, converted to those that everything here expects: Rec.709, white at D65.
 
+#![cfg_attr(not(feature = "profiles"), allow(dead_code, reason = "what profiles become"))]
+
 use noisefloor::Rgb;
 use noisefloor::display::{srgb_decode, srgb_encode};
 use noisefloor::viewing::{Chromaticities, Eotf, Viewing};

@@ -4,13 +4,11 @@ use crate::colours::{Curve, Stated, ToRec709, Treatment, is_srgb};
 use crate::error::PictureError;
 use crate::open::{Format, Opened, check_size, guarded};
 use crate::picture::DisplayImage;
-use image::codecs::png::PngDecoder;
-use image::{DynamicImage, ImageDecoder, Limits};
-use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
-use noisefloor::internal::printable;
+use noisefloor::Rgb;
 use noisefloor::viewing::{Chromaticities, Viewing};
-use png::{CodingIndependentCodePoints, SourceChromaticities};
+use png::{BitDepth, CodingIndependentCodePoints, SourceChromaticities, Transformations};
 use std::io::{self, Read, Seek};
+use std::ops::Range;
 use std::path::Path;
 
 /// Memory for everything in a PNG that is not pixels: rows, profiles, text.
@@ -55,10 +53,9 @@ pub(crate) fn stated_colours(path: &Path, mut opened: Opened) -> Result<Option<S
 /// Alpha in 0…1, if there is any.
 pub(crate) fn decode_alpha(path: &Path, opened: Opened) -> Result<Option<Vec<f32>>, PictureError> {
     guarded(path, "PNG", || {
-        let image = decode_raw(path, opened)?;
-        let alpha =
-            |image: DynamicImage| image.into_rgba16().pixels().map(|p| f32::from(p.0[3]) / 65535.0).collect();
-        Ok(image.color().has_alpha().then(|| alpha(image)))
+        let stored = decode_raw(path, opened)?;
+        let last = stored.channels - 1;
+        Ok((last % 2 == 1).then(|| stored.pixels().map(|pixel| stored.code(pixel, last)).collect()))
     })
 }
 
@@ -69,15 +66,13 @@ pub(crate) fn decode(
 ) -> Result<DisplayImage, PictureError> {
     guarded(path, "PNG", || {
         let stated = stated(path, &mut opened)?;
-        let image = decode_raw(path, opened)?;
-        let (width, height) = (image.width() as usize, image.height() as usize);
-        let deep = image.color().bytes_per_pixel() > image.color().channel_count();
-        let (mut pixels, codes): (Vec<_>, _) = if deep {
-            (image.into_rgb16().pixels().map(|p| p.0.map(|v| f32::from(v) / 65535.0)).collect(), 65535.0)
-        } else {
-            (image.into_rgb8().pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)).collect(), 255.0)
-        };
-        let mut step = 1.0 / codes;
+        let stored = decode_raw(path, opened)?;
+        // The one channel of a grey, or the first three
+        let colours = if stored.channels < 3 { [0; 3] } else { [0, 1, 2] };
+        let mut pixels: Vec<Rgb> =
+            stored.pixels().map(|pixel| colours.map(|channel| stored.code(pixel, channel))).collect();
+        let mut step = if stored.deep { 1.0 / 65535.0 } else { 1.0 / 255.0 };
+        let Stored { width, height, .. } = stored;
         match stated.as_ref().map_or(Treatment::Keep, |stated| stated.on(viewing)) {
             Treatment::Keep => {}
             Treatment::Convert(stated) => step = stated.to_srgb(&mut pixels, step),
@@ -190,47 +185,12 @@ fn code_points(points: CodingIndependentCodePoints) -> String {
     )
 }
 
-/// A profile of three primaries and their curves, or of a grey.
-fn by_profile(profile: &[u8]) -> Result<Stated, String> {
-    let unreadable = |reason: &dyn std::fmt::Display| format!("those of a broken profile ({reason})");
-    let profile = ColorProfile::new_from_slice(profile).map_err(|e| unreadable(&e))?;
-    let name = match &profile.description {
-        Some(ProfileText::PlainString(name)) => printable(name),
-        Some(ProfileText::Localizable(names)) => {
-            names.first().map(|n| printable(&n.value)).unwrap_or_default()
-        }
-        Some(ProfileText::Description(name)) => printable(&name.ascii_string),
-        None => "without a name".into(),
-    };
-    let tables =
-        [&profile.lut_a_to_b_perceptual, &profile.lut_a_to_b_colorimetric, &profile.lut_a_to_b_saturation];
-    let grey = profile.color_space == DataColorSpace::Gray;
-    let curves = match (&profile.red_trc, &profile.green_trc, &profile.blue_trc, &profile.gray_trc) {
-        (_, _, _, Some(k)) if grey => [k, k, k],
-        (Some(r), Some(g), Some(b), _) if profile.is_matrix_shaper() => [r, g, b],
-        _ => return Err(format!("those of the profile “{name}”, which is no three primaries with curves")),
-    };
-    if tables.iter().any(|table| table.is_some()) {
-        return Err(format!("those of the profile “{name}”, which is a table rather than primaries"));
-    }
-    let matrix = if grey {
-        None
-    } else {
-        let colorants = [profile.red_colorant, profile.green_colorant, profile.blue_colorant];
-        let rows = [colorants.map(|c| c.x), colorants.map(|c| c.y), colorants.map(|c| c.z)];
-        Some(ToRec709::of_profile(rows).ok_or_else(|| unreadable(&"its primaries are no colours"))?)
-    };
-    let [r, g, b] = curves.map(table);
-    let curve = || Some(Curve::Table(Box::new([r?, g?, b?])));
-    let curve = curve().ok_or_else(|| unreadable(&"its curves are none"))?;
-    Ok(Stated { gamut: None, matrix, curve })
-}
+#[cfg(feature = "profiles")]
+use crate::profile::stated as by_profile;
 
-/// The light of every code of 16 bits, and of 8, which are among them.
-fn table(curve: &ToneReprCurve) -> Option<Vec<f32>> {
-    let curve = curve.make_linear_evaluator().ok()?;
-    let table: Vec<f32> = (0..=65535).map(|code| curve.evaluate_value(code as f32 / 65535.0)).collect();
-    table.iter().all(|v| (-1.0..=2.0).contains(v)).then_some(table)
+#[cfg(not(feature = "profiles"))]
+fn by_profile(_: &[u8]) -> Result<Stated, String> {
+    Err("those of a profile, which a build without the feature `profiles` does not read".into())
 }
 
 fn chromaticities(stated: SourceChromaticities) -> Chromaticities {
@@ -255,18 +215,48 @@ fn by_gamma(gamma: Option<f64>, gamut: Option<Chromaticities>) -> Result<Option<
     Ok((!nothing).then_some(Stated { gamut: Some(colours), matrix, curve }))
 }
 
-/// The pixels as they are stored.
-fn decode_raw(path: &Path, opened: Opened) -> Result<DynamicImage, PictureError> {
+/// Pixels as they are stored, of one to four channels.
+struct Stored {
+    width: usize,
+    height: usize,
+    channels: usize,
+    /// Of 16 bits, big-endian, in place of 8.
+    deep: bool,
+    bytes: Vec<u8>,
+}
+
+impl Stored {
+    fn pixels(&self) -> Range<usize> {
+        0..self.width * self.height
+    }
+
+    /// A channel of a pixel, as a share of the largest code.
+    fn code(&self, pixel: usize, channel: usize) -> f32 {
+        let at = pixel * self.channels + channel;
+        if self.deep {
+            f32::from(u16::from_be_bytes([self.bytes[2 * at], self.bytes[2 * at + 1]])) / 65535.0
+        } else {
+            f32::from(self.bytes[at]) / 255.0
+        }
+    }
+}
+
+fn decode_raw(path: &Path, opened: Opened) -> Result<Stored, PictureError> {
     let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
     // Header: the size, and whether the file is long enough to hold that many pixels
-    let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(MAX_PNG_EXTRA);
-    let decoder = PngDecoder::with_limits(opened.reader, limits).map_err(|e| broken(e.to_string()))?;
-    let (width, height) = decoder.dimensions();
+    let limits = png::Limits { bytes: MAX_PNG_EXTRA as usize };
+    let mut decoder = png::Decoder::new_with_limits(opened.reader, limits);
+    decoder.set_transformations(Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(|e| broken(e.to_string()))?;
+    let (width, height) = reader.info().size();
     let (width, height) = (width as usize, height as usize);
     check_size(path, (width, height), opened.most_pixels)?;
     if (width * height) as u64 > opened.bytes.saturating_mul(PIXELS_A_BYTE) {
         return Err(broken(format!("{} bytes cannot hold {width}×{height} pixels", opened.bytes)));
     }
-    DynamicImage::from_decoder(decoder).map_err(|e| broken(e.to_string()))
+    let (colours, depth) = reader.output_color_type();
+    let (channels, deep) = (colours.samples(), depth == BitDepth::Sixteen);
+    let mut bytes = vec![0; width * height * channels * if deep { 2 } else { 1 }];
+    reader.next_frame(&mut bytes).map_err(|e| broken(e.to_string()))?;
+    Ok(Stored { width, height, channels, deep, bytes })
 }

@@ -48,6 +48,8 @@ pub mod maps;
 mod open;
 mod picture;
 mod plane;
+#[cfg(feature = "profiles")]
+mod profile;
 mod read;
 mod stack;
 #[cfg(feature = "tables")]

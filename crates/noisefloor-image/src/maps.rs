@@ -2,14 +2,13 @@
 
 use crate::atomic::write_atomic;
 use crate::error::WriteError;
+use crate::write::encode_png;
 use colorous::INFERNO;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13, FONT_7X13_BOLD};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
-use image::RgbImage;
-use image::codecs::png::PngEncoder;
 use noisefloor::{Rgb, Tile};
 use std::convert::Infallible;
 use std::path::Path;
@@ -77,11 +76,15 @@ pub const NOISE_SCALE: ColourScale = ColourScale {
 
 /// An RGB picture to draw on, also with `embedded_graphics`. Whatever lies outside is left out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Canvas(RgbImage);
+pub struct Canvas {
+    width: usize,
+    height: usize,
+    pixels: Vec<[u8; 3]>,
+}
 
 impl OriginDimensions for Canvas {
     fn size(&self) -> Size {
-        Size::new(self.0.width(), self.0.height())
+        Size::new(self.width as u32, self.height as u32)
     }
 }
 
@@ -102,8 +105,7 @@ impl DrawTarget for Canvas {
 impl Canvas {
     /// A canvas of one colour, at most [`noisefloor::tile::MAX_EDGE`] pixels and a legend wide.
     pub fn new(width: usize, height: usize, colour: [u8; 3]) -> Self {
-        let edge = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
-        Self(RgbImage::from_pixel(edge(width), edge(height), image::Rgb(colour)))
+        Self { width, height, pixels: vec![colour; width * height] }
     }
 
     /// A display-encoded picture `width` pixels wide, in [0, 1]; an incomplete last row is left out.
@@ -113,34 +115,32 @@ impl Canvas {
 
     /// A picture whose display-encoded pixels, in [0, 1], are computed from their row-major index.
     pub fn of_pixels(width: usize, height: usize, encoded: impl Fn(usize) -> Rgb) -> Self {
-        let mut canvas = Self::new(width, height, PAPER);
-        for (pixel, to) in canvas.0.pixels_mut().enumerate() {
-            to.0 = encoded(pixel).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
-        }
-        canvas
+        let byte = |c: f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let pixels = (0..width * height).map(|pixel| encoded(pixel).map(byte)).collect();
+        Self { width, height, pixels }
     }
 
     /// An sRGB-encoded picture `width` pixels wide, row-major, three bytes a pixel; an incomplete last row is
     /// left out.
     pub fn of_bytes(width: usize, rgb: &[u8]) -> Self {
         let mut canvas = Self::new(width, rgb.len() / (3 * width.max(1)), PAPER);
-        canvas.0.iter_mut().zip(rgb).for_each(|(to, &from)| *to = from);
+        canvas.pixels.as_flattened_mut().iter_mut().zip(rgb).for_each(|(to, &from)| *to = from);
         canvas
     }
 
     /// Width in pixels.
     pub fn width(&self) -> usize {
-        self.0.width() as usize
+        self.width
     }
 
     /// Height in pixels.
     pub fn height(&self) -> usize {
-        self.0.height() as usize
+        self.height
     }
 
     /// sRGB-encoded, row-major, three bytes a pixel.
     pub fn bytes(&self) -> &[u8] {
-        self.0.as_raw()
+        self.pixels.as_flattened()
     }
 
     /// Colours one pixel.
@@ -150,14 +150,15 @@ impl Canvas {
 
     /// Luminance of a pixel as displayed, 0 to 255.
     fn grey(&self, x: usize, y: usize) -> f32 {
-        noisefloor::display::luminance(self.0.get_pixel(x as u32, y as u32).0.map(f32::from))
+        noisefloor::display::luminance(self.pixels[y * self.width + x].map(f32::from))
     }
 
     /// Mixes a colour into a pixel; `alpha` is its share, in [0, 1].
     pub fn blend(&mut self, x: usize, y: usize, colour: [u8; 3], alpha: f64) {
-        let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
-        let Some(pixel) = self.0.get_pixel_mut_checked(x, y) else { return };
-        for (old, new) in pixel.0.iter_mut().zip(colour) {
+        if x >= self.width || y >= self.height {
+            return;
+        }
+        for (old, new) in self.pixels[y * self.width + x].iter_mut().zip(colour) {
             *old = (f64::from(*old) * (1.0 - alpha) + f64::from(new) * alpha).round() as u8;
         }
     }
@@ -166,9 +167,9 @@ impl Canvas {
     ///
     /// # Errors
     /// What the encoder says, if the canvas has no pixels.
-    pub fn to_png(&self) -> Result<Vec<u8>, image::ImageError> {
+    pub fn to_png(&self) -> Result<Vec<u8>, png::EncodingError> {
         let mut bytes = Vec::new();
-        self.0.write_with_encoder(PngEncoder::new(&mut bytes))?;
+        encode_png(&mut bytes, self.width, self.height, self.bytes())?;
         Ok(bytes)
     }
 
@@ -177,7 +178,7 @@ impl Canvas {
     /// # Errors
     /// Those of [`write_atomic`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
-        write_atomic(path, |to| self.0.write_with_encoder(PngEncoder::new(to)))
+        write_atomic(path, |to| encode_png(to, self.width, self.height, self.bytes()))
     }
 
     /// A white triangle with an edge of ink, its right angle at (x, y).

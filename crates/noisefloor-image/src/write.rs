@@ -7,9 +7,8 @@ use crate::plane::{Channel, Channels, Plane};
 use exr::prelude::{
     Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder, Text, WritableImage,
 };
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
 use noisefloor::{Rgb, internal::check_image};
+use std::io::Write;
 use std::path::Path;
 
 /// Longest edge of a PNG in pixels, by the format.
@@ -124,10 +123,23 @@ pub fn write_png(path: impl AsRef<Path>, width: usize, height: usize, rgb: &[u8]
         return Err(WriteError::Png { path: path.to_owned(), width, height });
     };
     check_len(path, "rgb", (width, height), rgb.len(), bytes)?;
-    write_atomic(path, |writer| {
-        // Both edges fit into 32 bits
-        PngEncoder::new(writer).write_image(rgb, width as u32, height as u32, ExtendedColorType::Rgb8)
-    })
+    write_atomic(path, |writer| encode_png(writer, width, height, rgb))
+}
+
+/// A PNG of three bytes a pixel, whose edges fit into 32 bits. Rendered pictures are compressed little, and soon.
+pub(crate) fn encode_png(
+    to: impl Write,
+    width: usize,
+    height: usize,
+    rgb: &[u8],
+) -> Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(to, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    encoder.set_filter(png::Filter::Adaptive);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgb)?;
+    writer.finish()
 }
 
 fn check_len(

@@ -151,6 +151,12 @@ pub enum LoadError {
     /// The extension is not one of a scene file.
     #[error("{} is not a scene file: its name must end in .gltf, .glb, .pbrt or .xml", path.display())]
     Format { path: PathBuf },
+    /// This build has no readers.
+    #[error("{}: this build reads no scene files: run `cargo run --release --features formats -- render …`", path.display())]
+    LeftOut {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file cannot be opened or read.
     #[error("{place} cannot be read")]
     Read {
@@ -213,7 +219,7 @@ impl LoadError {
 
     fn finding(&self) -> (Treatment, String, Option<Place>) {
         let (place, what) = match self {
-            Self::Format { .. } | Self::Several(_) => (None, self.to_string()),
+            Self::Format { .. } | Self::LeftOut { .. } | Self::Several(_) => (None, self.to_string()),
             Self::Bad { place, what } => (Some(place), what.clone()),
             Self::Unsupported { place, what } => (Some(place), format!("{what} is not supported")),
             Self::Outside { place, name } => {

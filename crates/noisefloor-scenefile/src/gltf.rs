@@ -7,7 +7,6 @@ mod accessor;
 mod asset;
 mod camera;
 mod clearcoat;
-#[cfg(feature = "draco")]
 mod draco;
 mod gloss;
 mod light;
@@ -51,7 +50,6 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
     let mut asset = Asset::parse(path, &folder, &file)?;
     notes::check_required(&asset)?;
     meshopt::inflate(&mut asset)?;
-    #[cfg(feature = "draco")]
     draco::inflate(&mut asset)?;
     let placed = nodes::placed(&asset)?;
     let sharing = shared::sharing(&placed);

@@ -3,22 +3,36 @@
 //!
 //! Files are hostile until parsed: every length is checked before anything is allocated, every error says
 //! which file and where, and what is not supported is named, with whether it was ignored or is fatal.
+//!
+//! All readers are behind the feature `formats`, on by default: a first build of the command has the types alone.
 
+#![cfg_attr(not(feature = "formats"), allow(dead_code, reason = "what readers say, and nobody reads"))]
 #![allow(missing_docs, reason = "serves the commands: any release may change what is public here")]
 
+#[cfg(feature = "formats")]
 mod bounds;
+#[cfg(feature = "formats")]
 mod channels;
+#[cfg(feature = "formats")]
 mod colour;
 mod error;
+#[cfg(feature = "formats")]
 mod files;
+#[cfg(feature = "formats")]
 mod gltf;
+#[cfg(feature = "formats")]
 mod indices;
 mod loaded;
+#[cfg(feature = "formats")]
 mod mesh;
+#[cfg(feature = "formats")]
 mod mitsuba;
 mod options;
+#[cfg(feature = "formats")]
 mod pbrt;
+#[cfg(feature = "formats")]
 mod picture;
+#[cfg(feature = "formats")]
 mod sky;
 
 pub use error::{Finding, LoadError, Place, Treatment, Warning, group_warnings};
@@ -38,16 +52,28 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
 /// As [`load`], with what the file leaves open.
 pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let mut loaded = match extension.as_str() {
-        "gltf" | "glb" => gltf::load(path, options.root.as_deref()),
-        "pbrt" => pbrt::load(path, options),
-        "xml" => mitsuba::load(path, options),
-        _ => Err(LoadError::Format { path: path.to_owned() }),
-    }?;
+    if !matches!(extension.as_str(), "gltf" | "glb" | "pbrt" | "xml") {
+        return Err(LoadError::Format { path: path.to_owned() });
+    }
+    let mut loaded = read(path, &extension, options)?;
     if !loaded.scene.is_lit() {
         loaded.warnings.push(Warning::ignored(Place::file(path), "the scene has no light: it is black"));
     }
     Ok(loaded)
+}
+
+#[cfg(feature = "formats")]
+fn read(path: &Path, extension: &str, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    match extension {
+        "pbrt" => pbrt::load(path, options),
+        "xml" => mitsuba::load(path, options),
+        _ => gltf::load(path, options.root.as_deref()),
+    }
+}
+
+#[cfg(not(feature = "formats"))]
+fn read(path: &Path, _: &str, _: &LoadOptions) -> Result<Loaded, LoadError> {
+    Err(LoadError::LeftOut { path: path.to_owned() })
 }
 
 #[cfg(doctest)]

@@ -159,7 +159,6 @@ fn folders_that_cannot_be_written() {
 }
 
 #[test]
-#[cfg(feature = "lab")]
 fn corpora() {
     let case = Case::new();
     let (folder, model) = (case.folder.path(), case.path("model.nfm"));
@@ -214,7 +213,6 @@ fn earlier_files_stay_when_the_last_check_fails() {
 
 /// Before the work, and not after it.
 #[test]
-#[cfg(feature = "lab")]
 fn a_model_that_cannot_be_written_is_not_trained() {
     let corpora = crate::learn::Corpora::new();
     let out = corpora.paths[0].join("thresholds.csv/my.nfm");
@@ -246,7 +244,6 @@ fn scene_files() {
 }
 
 #[test]
-#[cfg(feature = "lab")]
 fn explore_begins_with_pictures_it_can_read_or_not_at_all() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -23,7 +23,6 @@ fn keep(path: &Path, name: &str, factor: f64, model: &str) {
 
 /// Without a browser, as for a build server: the factor is found, guessing is an error, nothing is kept.
 #[test]
-#[cfg(feature = "watch")]
 fn simulated_observers_are_calibrated() {
     let home = tempfile::tempdir().unwrap();
     let run = |what: &str| {
@@ -107,7 +106,6 @@ fn renders_stop_for_the_eyes_that_are_kept() {
 
 /// Before the first question, and not after the last.
 #[test]
-#[cfg(feature = "watch")]
 fn what_could_not_be_kept_is_said_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let ask = |out: &Path, more: &[&str], words: &[&str]| {

@@ -136,19 +136,13 @@ fn writers(folder: &Path) -> Vec<(Vec<String>, bool)> {
     }
     writer("metrics @a.exr @b.exr --map", true);
     writer("reference bulb --size 16x16 --quiet --force --out", true);
-    if cfg!(feature = "lab") {
-        writer("train --table @table.csv --no-scores --out", true);
-        writer("train --table @table.csv --no-scores --out @model.nfm --save-table", true);
-        writer("evaluate --table @table.csv --json", true);
-        writer("evaluate --table @table.csv --csv", true);
-    }
-    if cfg!(feature = "lab") {
-        let small = "compare bulb --size 32x32 --tile 32 --criteria spp:4 --max-spp 100 --reference-spp 4";
-        writer(&format!("{small} --quiet --out"), false);
-    }
-    if cfg!(feature = "lab") {
-        writer("study stack bulb --size 64x64 --levels 1,2 --out", false);
-    }
+    writer("train --table @table.csv --no-scores --out", true);
+    writer("train --table @table.csv --no-scores --out @model.nfm --save-table", true);
+    writer("evaluate --table @table.csv --json", true);
+    writer("evaluate --table @table.csv --csv", true);
+    let small = "compare bulb --size 32x32 --tile 32 --criteria spp:4 --max-spp 100 --reference-spp 4";
+    writer(&format!("{small} --quiet --out"), false);
+    writer("study stack bulb --size 64x64 --levels 1,2 --out", false);
     writers
 }
 

@@ -47,13 +47,10 @@ fn other_results_are_overwritten_only_on_request() {
     refuse(&args, &["reference.exr", "--force"]);
     succeed(&[&args[..], &["--force"]].concat());
 
-    #[cfg(feature = "lab")]
-    {
-        let stack = folder.path().join("stack");
-        let args = ["study", "stack", "bulb", "--size", "64x64", "--levels", "1,2", "--out", text(&stack)];
-        succeed(&args);
-        refuse(&args, &["holds a stack", "--out"]);
-    }
+    let stack = folder.path().join("stack");
+    let args = ["study", "stack", "bulb", "--size", "64x64", "--levels", "1,2", "--out", text(&stack)];
+    succeed(&args);
+    refuse(&args, &["holds a stack", "--out"]);
 }
 
 /// Whoever asks for more of a finished render goes on with its samples.
@@ -150,7 +147,6 @@ fn a_scene_that_was_edited_is_not_resumed() {
 }
 
 #[test]
-#[cfg(feature = "lab")]
 fn a_reference_of_a_scene_that_was_edited_is_not_used() {
     let (folder, scene) = scene();
     let out = folder.path().join("compared");

@@ -1,4 +1,4 @@
-use crate::kit::succeed;
+use crate::kit::{stderr, succeed};
 
 // Long: a list of cases
 #[test]
@@ -98,7 +98,6 @@ fn at_least_six_scenes_are_listed() {
 }
 
 #[test]
-#[cfg(feature = "lab")]
 fn every_command_of_the_lab_explains_itself() {
     let options: [(&str, &[&str]); 6] = [
         ("explore", &["IMAGE", "--model", "--people", "--audience", "--database", "--table", "--listen"]),
@@ -127,12 +126,13 @@ fn shells_and_man_know_the_command() {
     succeed(&["man", folder.path().to_str().unwrap()]);
     let page = std::fs::read_to_string(folder.path().join("noisefloor-render.1")).unwrap();
     assert!(page.contains("max\\-spp") && folder.path().join("noisefloor-farm-plan.1").exists(), "{page}");
-    #[cfg(feature = "lab")]
-    {
-        let lab = || std::process::Command::new(env!("CARGO_BIN_EXE_noisefloor-lab"));
-        let bash = lab().args(["completions", "bash"]).output().unwrap().stdout;
-        assert!(String::from_utf8(bash).unwrap().contains("--leave-one-scene-out"));
-        assert!(lab().arg("man").arg(folder.path()).status().unwrap().success());
-        assert!(folder.path().join("noisefloor-lab-study-serve.1").exists());
-    }
+    let lab = || std::process::Command::new(env!("CARGO_BIN_EXE_noisefloor-lab"));
+    let bash = lab().args(["completions", "bash"]).output().unwrap().stdout;
+    assert!(String::from_utf8(bash).unwrap().contains("--leave-one-scene-out"));
+    assert!(lab().arg("man").arg(folder.path()).status().unwrap().success());
+    assert!(folder.path().join("noisefloor-lab-study-serve.1").exists());
+    let elsewhere = lab().args(["render", "hall.xml"]).output().unwrap();
+    assert_eq!(elsewhere.status.code(), Some(2));
+    let said = stderr(&elsewhere);
+    assert!(said.contains("'render' is a command of noisefloor: `cargo run --release -- …`"), "{said}");
 }

@@ -6,15 +6,10 @@ use std::process::{Command, Output};
 /// Commands of `noisefloor-lab`; all others are those of `noisefloor`.
 pub(crate) const LAB: [&str; 7] =
     ["train", "evaluate", "audience", "compare", "reproduce", "study", "explore"];
-#[cfg(feature = "lab")]
-const LAB_PROGRAM: &str = env!("CARGO_BIN_EXE_noisefloor-lab");
-/// Which says where they are.
-#[cfg(not(feature = "lab"))]
-const LAB_PROGRAM: &str = env!("CARGO_BIN_EXE_noisefloor");
-
 pub(crate) fn command(args: &[&str]) -> Command {
     let lab = args.first().is_some_and(|command| LAB.contains(command));
-    let mut command = Command::new(if lab { LAB_PROGRAM } else { env!("CARGO_BIN_EXE_noisefloor") });
+    let program = if lab { env!("CARGO_BIN_EXE_noisefloor-lab") } else { env!("CARGO_BIN_EXE_noisefloor") };
+    let mut command = Command::new(program);
     command.args(args);
     // Whoever runs the tests may have calibrated their eyes
     command.env("XDG_CONFIG_HOME", "/nowhere").env("APPDATA", "/nowhere");

@@ -1,9 +1,8 @@
 //! Tests of the two commands as they are run: exit codes, files, and one line an error. One module a
-//! subject; those of `noisefloor-lab` need `--all-features`.
+//! subject; they need `--all-features`.
 
 /// Lines from one public to another.
 #[cfg(test)]
-#[cfg(feature = "lab")]
 mod audience;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
@@ -13,7 +12,6 @@ mod bad_input;
 mod calibrate;
 /// Criteria side by side.
 #[cfg(test)]
-#[cfg(feature = "lab")]
 mod compare;
 /// Kills, full disks, folders that nobody can write.
 #[cfg(test)]
@@ -40,11 +38,7 @@ mod judge;
 mod kit;
 /// Train, inspect, evaluate.
 #[cfg(test)]
-#[cfg(feature = "lab")]
 mod learn;
-/// What a build leaves out.
-#[cfg(test)]
-mod left_out;
 /// Published metrics of two pictures.
 #[cfg(test)]
 mod metrics;
@@ -56,7 +50,6 @@ mod reference;
 mod render;
 /// The paper's protocols: run, resumed, refused.
 #[cfg(test)]
-#[cfg(feature = "lab")]
 mod reproduce;
 /// Where results cannot go, and where nobody reads them.
 #[cfg(test)]
@@ -74,7 +67,6 @@ mod slurm;
 mod sources;
 /// Stacks, links, raw data and copies of a study.
 #[cfg(test)]
-#[cfg(feature = "lab")]
 mod study;
 /// What the screen shows: LUTs.
 #[cfg(test)]

@@ -44,22 +44,16 @@ impl Talkers {
         all.push(owned(&["reference", "cornell-box", "--size", "16x16", "--out", &reference]));
         all.push(owned(&["scenes", "check", scene]));
         all.push(owned(&["doctor"]));
-        if cfg!(feature = "lab") {
-            let table = self.path("pairs.csv");
-            std::fs::write(&table, "observers,audience\n1,2\n2,4\n3,6\n").unwrap();
-            all.push(owned(&["audience", "fit", &table]));
-            all.push(owned(&["audience", "fit", &table, "--json"]));
-        }
-        if cfg!(feature = "lab") {
-            let small = ["compare", "bulb", "--size", "32x32", "--tile", "32", "--criteria", "spp:4"];
-            let few = ["--max-spp", "100", "--reference-spp", "4", "--out"];
-            all.push(owned(&[&small[..], &few, &[self.path("compared").as_str()]].concat()));
-        }
-        if cfg!(feature = "lab") {
-            let stack = self.path("stack");
-            let small = ["study", "stack", "bulb", "--size", "64x64", "--levels", "1,2", "--out", &stack];
-            all.push(owned(&small));
-        }
+        let table = self.path("pairs.csv");
+        std::fs::write(&table, "observers,audience\n1,2\n2,4\n3,6\n").unwrap();
+        all.push(owned(&["audience", "fit", &table]));
+        all.push(owned(&["audience", "fit", &table, "--json"]));
+        let small = ["compare", "bulb", "--size", "32x32", "--tile", "32", "--criteria", "spp:4"];
+        let few = ["--max-spp", "100", "--reference-spp", "4", "--out"];
+        all.push(owned(&[&small[..], &few, &[self.path("compared").as_str()]].concat()));
+        let stack = self.path("stack");
+        let small = ["study", "stack", "bulb", "--size", "64x64", "--levels", "1,2", "--out", &stack];
+        all.push(owned(&small));
         all
     }
 }

@@ -1,5 +1,4 @@
 use crate::kit::{FILES, command, fail, json, stderr, succeed, table, text};
-#[cfg(feature = "lab")]
 use crate::learn::Corpora;
 use noisefloor_image::{read_exr, read_picture};
 use noisefloor_testkit::HANG;
@@ -119,7 +118,6 @@ fn a_save_that_fails_is_told() {
 
 /// Sixteen results, of which the first is there: it is whole, and no report claims to have all.
 #[test]
-#[cfg(feature = "lab")]
 fn what_is_reproduced_so_far_survives_an_interrupt() {
     let (corpora, folder) = (Corpora::new(), tempdir().unwrap());
     let out = folder.path();
@@ -209,7 +207,6 @@ fn a_checkpoint_of_another_render_is_refused() {
 
 /// Two scenes, of which the second would take minutes: the page says that it has one.
 #[test]
-#[cfg(feature = "lab")]
 fn the_page_of_an_interrupted_comparison_says_so() {
     let folder = tempdir().unwrap();
     let out = folder.path();

@@ -105,7 +105,6 @@ fn get(address: SocketAddr, path: &str, host: &str) -> (u16, Vec<u8>) {
     (status, reply.split_off(body))
 }
 
-#[cfg(feature = "lab")]
 #[test]
 fn a_render_is_watched_on_a_page() {
     let folder = tempdir().unwrap();

@@ -8,7 +8,6 @@ use std::fmt;
 /// Extensions that a file may require. `KHR_mesh_quantization` is but a wider choice of accessors, all of which are
 /// read; of `KHR_materials_variants` the material without a variant is shown, as its specification has it.
 const KNOWN: &[&str] = &[
-    #[cfg(feature = "draco")]
     super::parts::DRACO,
     super::meshopt::NAME,
     super::parts::WEBP,

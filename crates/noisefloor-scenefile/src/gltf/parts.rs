@@ -2,7 +2,6 @@
 
 use noisefloor_ptwne::{Emission, MaterialId};
 
-#[cfg(feature = "draco")]
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 /// The extension of textures whose image is WebP.
 pub(super) const WEBP: &str = "EXT_texture_webp";

@@ -8,7 +8,6 @@
 )]
 
 mod bad; // bad files, and what is said of them
-#[cfg(feature = "draco")]
 mod draco; // compressed meshes
 mod extensions; // normal maps, coats, colours of vertices, daylight
 mod fuzz; // thousands of files with damage
