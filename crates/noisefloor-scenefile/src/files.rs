@@ -21,13 +21,18 @@ pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
 /// Most bytes of all files, each counted as often as it is read.
 const MAX_BYTES: u64 = 1 << 34;
 /// What compressed data may become: so many bytes in any scene, and so many for each byte of its files. Deflate makes
-/// at most 1032 of one byte and meshopt 64, but meshes at most some 30 (those of Draco). A limit on each part alone
+/// at most 1032 of one byte, but meshes at most some 30 (those of Draco). A limit on each part alone
 /// would let a short file name a part any number of times.
 const FREE_INFLATED: u64 = 1 << 26;
 const INFLATED_A_BYTE: u64 = 256;
 /// The same for pixels of pictures, of which deflate makes 344 from a byte if they are RGB.
 const FREE_PIXELS: u64 = 1 << 25;
 const PIXELS_A_BYTE: u64 = 512;
+/// Surfaces that any scene may have, and so many for each byte of its files: text has a triangle in some 30 bytes, of which
+/// three levels of subdivision make 64. A short file can name a mesh, a lamp in instances or other files any number of
+/// times.
+const FREE_SURFACES: u64 = 1 << 21;
+const SURFACES_A_BYTE: u64 = 2;
 /// Most folders that a scene may add to those where its files are looked for.
 const MAX_FOLDERS: u64 = 64;
 
@@ -48,6 +53,8 @@ pub(crate) struct Folder {
     /// What compressed data became so far, in bytes and in pixels.
     inflated: Cell<u64>,
     pixels: Cell<u64>,
+    /// Surfaces so far.
+    surfaces: Cell<u64>,
 }
 
 impl Folder {
@@ -71,6 +78,7 @@ impl Folder {
             distinct_bytes: Cell::new(0),
             inflated: Cell::new(0),
             pixels: Cell::new(0),
+            surfaces: Cell::new(0),
         }
     }
 
@@ -159,6 +167,24 @@ impl Folder {
         self.pixels.set(self.pixels.get().saturating_add(pixels));
         let most = self.distinct_bytes.get().saturating_mul(PIXELS_A_BYTE).saturating_add(FREE_PIXELS);
         place.clone().at_most("pixels of pictures so far", self.pixels.get(), most)
+    }
+
+    /// Counts surfaces, before or after they are made.
+    ///
+    /// # Errors
+    /// As [`Self::inflate`].
+    pub(crate) fn build(&self, surfaces: u64, place: &Place) -> Result<(), LoadError> {
+        self.surfaces.set(self.surfaces.get().saturating_add(surfaces));
+        place.clone().at_most("surfaces so far", self.surfaces.get(), self.most_surfaces())
+    }
+
+    /// How many more surfaces there may be.
+    pub(crate) fn unbuilt(&self) -> u64 {
+        self.most_surfaces().saturating_sub(self.surfaces.get())
+    }
+
+    fn most_surfaces(&self) -> u64 {
+        self.distinct_bytes.get().saturating_mul(SURFACES_A_BYTE).saturating_add(FREE_SURFACES)
     }
 
     /// Digests of all files that were read.

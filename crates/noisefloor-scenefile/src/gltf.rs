@@ -13,7 +13,6 @@ mod light;
 mod loader;
 mod material;
 mod mesh;
-mod meshopt;
 mod nodes;
 mod notes;
 mod parts;
@@ -47,10 +46,9 @@ const BYTES_EACH: u64 = 64;
 pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError> {
     let folder = Folder::of(path, root, String::new());
     let file = folder.read(path, MAX_BYTES, &Place::file(path))?;
-    let mut asset = Asset::parse(path, &folder, &file)?;
+    let asset = Asset::parse(path, &folder, &file)?;
     notes::check_required(&asset)?;
-    meshopt::inflate(&mut asset)?;
-    draco::inflate(&mut asset)?;
+    let asset = draco::inflated(asset)?;
     let placed = nodes::placed(&asset)?;
     let sharing = shared::sharing(&placed);
     check_size(&asset, &placed, &sharing)?;
@@ -122,7 +120,7 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
 fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>], sharing: &HashSet<usize>) -> Result<(), LoadError> {
     let (mut primitives, mut vertices, mut triangles) = (0u64, 0u64, 0u64);
     let mut seen = HashSet::new();
-    for placed in placed {
+    for placed in placed.iter().flat_map(|placed| placed.shown.iter().map(move |_| placed)) {
         let Some(index) = placed.node.mesh else { continue };
         let mesh = asset.get(index, "mesh", &placed.place)?;
         let again = sharing.contains(&placed.index) && !seen.insert(index.value());
@@ -142,10 +140,11 @@ fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>], sharing: &HashSet<usize>
             let shapes = 1 + primitive.targets.as_ref().map_or(0, Vec::len) as u64;
             primitives += shapes;
             vertices = vertices.saturating_add(corners.saturating_mul(shapes));
-            triangles = triangles.saturating_add(mesh::count(mesh::mode(primitive, &place)?, indices));
+            let own = mesh::count(mesh::mode(primitive, &place)?, indices);
+            triangles = triangles.saturating_add(own);
             place.clone().at_most("primitives of nodes up to here", primitives, MAX_PRIMITIVES)?;
             place.clone().at_most("vertices up to here", vertices, 3 * MAX_SURFACES as u64)?;
-            place.clone().at_most("triangles up to here", triangles, MAX_SURFACES as u64)?;
+            asset.folder().build(own, &place)?;
         }
     }
     has_memory(vertices + triangles, BYTES_EACH, &Place::file(asset.path))

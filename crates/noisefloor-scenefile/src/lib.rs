@@ -41,7 +41,8 @@ pub use options::LoadOptions;
 
 use std::path::Path;
 
-/// Loads the scene in `path`; its extension says which format: `.gltf`, `.glb`, `.xml` or `.pbrt`.
+/// Loads the scene in `path`; its extension says which format: `.gltf`, `.glb` (or `.vrm`, which is one), `.xml` or
+/// `.pbrt`.
 ///
 /// # Errors
 /// [`LoadError`] if a file cannot be read or parsed, or asks for something that cannot be left out.
@@ -52,7 +53,7 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
 /// As [`load`], with what the file leaves open.
 pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    if !matches!(extension.as_str(), "gltf" | "glb" | "pbrt" | "xml") {
+    if !matches!(extension.as_str(), "gltf" | "glb" | "vrm" | "pbrt" | "xml") {
         return Err(LoadError::Format { path: path.to_owned() });
     }
     let mut loaded = read(path, &extension, options)?;

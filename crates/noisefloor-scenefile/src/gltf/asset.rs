@@ -83,23 +83,12 @@ impl<'a> Asset<'a> {
     /// The bytes of a buffer view that `place` names.
     pub(super) fn view(&self, index: Index<buffer::View>, place: &Place) -> Result<&[u8], LoadError> {
         let view = self.get(index, "buffer view", place)?;
-        let called = || Place::part(self.path, format_args!("buffer view {}", index.value()));
-        self.bytes_of(view, place, called)
-    }
-
-    /// The bytes of a view at `called`, which `place` names.
-    pub(super) fn bytes_of(
-        &self,
-        view: &buffer::View,
-        place: &Place,
-        called: impl Fn() -> Place,
-    ) -> Result<&[u8], LoadError> {
         let bytes = self.buffer(view.buffer, place)?;
         let start = view.byte_offset.unwrap_or_default().0;
         let end = start.checked_add(view.byte_length.0);
         let range = usize::try_from(start).ok().zip(end.and_then(|end| usize::try_from(end).ok()));
         range.and_then(|(start, end)| bytes.get(start..end)).ok_or_else(|| {
-            called().bad(format_args!(
+            Place::part(self.path, format_args!("buffer view {}", index.value())).bad(format_args!(
                 "{} bytes from byte {start} reach past the end of buffer {}, which has {}",
                 view.byte_length.0,
                 view.buffer.value(),

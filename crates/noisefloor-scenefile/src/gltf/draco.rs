@@ -2,7 +2,7 @@
 //! numbers become buffers of the asset, and accessors point to them, as if the file had them so.
 
 use super::asset::Asset;
-use super::mesh::{attribute, count, mode};
+use super::mesh::attribute;
 use super::parts::{DRACO as NAME, name};
 use crate::files::has_memory;
 use crate::{LoadError, Place};
@@ -13,14 +13,10 @@ use gltf::json::buffer::View;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index, Value, deserialize};
-use noisefloor_ptwne::MAX_SURFACES;
 use std::collections::{BTreeMap, HashMap};
 
-/// Most bytes of a vertex, in all attributes of a compressed mesh: 16 of four words each have 256.
-const VERTEX_BYTES: u64 = 1024;
 /// Bytes that a vertex or a triangle takes while it is inflated, about: tables of neighbours, and the numbers twice.
 const BYTES_EACH: u64 = 512;
-
 /// Those of them that stay, about.
 const KEPT_EACH: u64 = 32;
 
@@ -29,14 +25,13 @@ struct Compressed {
     view: Index<View>,
     /// Number of an attribute in the data, by its name.
     attributes: BTreeMap<String, u32>,
-    vertices: u64,
-    /// None if the primitive has no indices, whose triangles the data alone counts.
-    triangles: Option<u64>,
+    /// Vertices and triangles, as its accessors count them. Old encoders counted before they left some out.
+    declared: u64,
     place: Place,
 }
 
 /// Inflates the meshes that are there only in this form. All data is decoded once, whoever refers to it.
-pub(super) fn inflate(asset: &mut Asset<'_>) -> Result<(), LoadError> {
+pub(super) fn inflated(mut asset: Asset<'_>) -> Result<Asset<'_>, LoadError> {
     let mut all: Vec<((usize, usize), Compressed)> = vec![];
     for (m, mesh) in asset.root.meshes.iter().enumerate() {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
@@ -44,37 +39,32 @@ pub(super) fn inflate(asset: &mut Asset<'_>) -> Result<(), LoadError> {
                 let called = name("mesh", m, mesh.name.as_deref());
                 Place::part(asset.path, format_args!("{called}, primitive {p}"))
             };
-            if let Some(compressed) = compressed(asset, primitive, place)? {
+            if let Some(compressed) = compressed(&asset, primitive, place)? {
                 all.push(((m, p), compressed));
             }
         }
     }
-    // What is decoded, as its primitives count it: a short file can stand for many triangles
     all.sort_by_key(|(_, compressed)| compressed.view.value());
-    let mut elements = 0u64;
     for group in all.chunk_by(|(_, a), (_, b)| a.view.value() == b.view.value()) {
         let (_, first) = &group[0];
-        let most = first.triangles.unwrap_or_else(|| asset.folder().left() / KEPT_EACH);
-        let own = first.vertices.saturating_add(most);
-        elements = elements.saturating_add(first.vertices).saturating_add(first.triangles.unwrap_or(0));
-        first.place.clone().at_most(
-            "compressed vertices and triangles so far",
-            elements,
-            MAX_SURFACES as u64,
-        )?;
-        let counted = first.vertices.saturating_add(first.triangles.unwrap_or(0));
-        asset.folder().inflate(counted.saturating_mul(KEPT_EACH), &first.place)?;
-        has_memory(own, BYTES_EACH, &first.place)?;
-        let mesh = decoded(asset, first, most)?;
-        if first.triangles.is_none() {
-            asset.folder().inflate((mesh.num_faces() as u64).saturating_mul(KEPT_EACH), &first.place)?;
+        // A short file can stand for many triangles
+        let left = asset.folder().left();
+        has_memory(first.declared.min(left / KEPT_EACH), BYTES_EACH, &first.place)?;
+        let mesh = decoded(&asset, first, left)?;
+        let elements = (mesh.num_points() + mesh.num_faces()) as u64;
+        asset.folder().inflate(elements.saturating_mul(KEPT_EACH), &first.place)?;
+        let past = |corner: &PointIndex| corner.0 as usize >= mesh.num_points();
+        if mesh.faces().iter().flatten().any(past) {
+            return Err(first
+                .place
+                .clone()
+                .bad("a triangle of its Draco data has a corner past the vertices"));
         }
         let faces: Vec<u8> =
             mesh.faces().iter().flatten().flat_map(|corner| corner.0.to_le_bytes()).collect();
         let triangles = asset.add_view(faces);
         let mut views: HashMap<u32, Index<View>> = HashMap::new();
         for ((m, p), compressed) in group {
-            fits(&mesh, compressed)?;
             let mut attributes = asset.root.meshes[*m].primitives[*p].attributes.clone();
             for (semantic, index) in &mut attributes {
                 let Checked::Valid(semantic) = semantic else { continue };
@@ -102,7 +92,7 @@ pub(super) fn inflate(asset: &mut Asset<'_>) -> Result<(), LoadError> {
     for primitive in asset.root.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
         primitive.extensions.iter_mut().for_each(|extensions| drop(extensions.others.remove(NAME)));
     }
-    Ok(())
+    Ok(asset)
 }
 
 /// What a primitive has of Draco, if its positions have no other data.
@@ -126,26 +116,21 @@ fn compressed(
     let attributes = extension.get("attributes").cloned().unwrap_or_default();
     let attributes =
         deserialize::from_value(attributes).map_err(|_| bad("it needs a number per attribute"))?;
-    let triangles = match primitive.indices {
-        Some(indices) => {
-            Some(count(mode(primitive, &place)?, asset.get(indices, "accessor", &place)?.count.0))
-        }
-        None => None,
+    let corners = match primitive.indices {
+        Some(indices) => asset.get(indices, "accessor", &place)?.count.0,
+        None => 0,
     };
-    Ok(Some(Compressed { view, attributes, vertices: positions.count.0, triangles, place }))
+    let declared = positions.count.0.saturating_add(corners / 3);
+    Ok(Some(Compressed { view, attributes, declared, place }))
 }
 
-/// The mesh in a buffer view, which has no more vertices than its primitive says, and at most so many triangles.
-fn decoded(
-    asset: &Asset<'_>,
-    compressed: &Compressed,
-    triangles: u64,
-) -> Result<draco_core::Mesh, LoadError> {
-    let Compressed { view, vertices, place, .. } = compressed;
+/// The mesh in a buffer view, which takes at most so many bytes.
+fn decoded(asset: &Asset<'_>, compressed: &Compressed, left: u64) -> Result<draco_core::Mesh, LoadError> {
+    let Compressed { view, place, .. } = compressed;
     let limits = DecodeLimits::default()
-        .with_max_points(*vertices)
-        .with_max_faces(triangles)
-        .with_max_decoded_bytes(vertices.saturating_mul(VERTEX_BYTES));
+        .with_max_points(left / KEPT_EACH)
+        .with_max_faces(left / KEPT_EACH)
+        .with_max_decoded_bytes(left);
     let data = asset.view(*view, place)?;
     // The one version of the extension; the decoder would try to make sense of later ones
     if let Some([b'D', b'R', b'A', b'C', b'O', major, minor]) = data.first_chunk()
@@ -157,8 +142,7 @@ fn decoded(
     let mut mesh = draco_core::Mesh::new();
     let failed = |cause: DracoError| match cause.kind() {
         ErrorKind::LimitExceeded => {
-            let what = "its Draco data has more than its accessors say";
-            place.clone().bad(format_args!("{what} ({vertices} vertices, {triangles} triangles): {cause}"))
+            place.clone().bad(format_args!("its Draco data is out of proportion to the file: {cause}"))
         }
         ErrorKind::UnsupportedFeature => {
             place.clone().unsupported(format_args!("this kind of Draco data ({cause})"))
@@ -167,25 +151,6 @@ fn decoded(
     };
     MeshDecoder::new().decode(&mut buffer, &mut mesh).map_err(failed)?;
     Ok(mesh)
-}
-
-/// Checks that a mesh is what its primitive says, and that its triangles have corners.
-fn fits(mesh: &draco_core::Mesh, compressed: &Compressed) -> Result<(), LoadError> {
-    let (points, faces) = (mesh.num_points() as u64, mesh.num_faces() as u64);
-    let triangles = compressed.triangles.unwrap_or(faces);
-    if (points, faces) != (compressed.vertices, triangles) {
-        return Err(compressed.place.clone().bad(format_args!(
-            "its Draco data has {points} vertices and {faces} triangles, but its accessors say {} and {triangles}",
-            compressed.vertices
-        )));
-    }
-    if mesh.faces().iter().flatten().any(|corner| u64::from(corner.0) >= points) {
-        return Err(compressed
-            .place
-            .clone()
-            .bad("a triangle of its Draco data has a corner past the vertices"));
-    }
-    Ok(())
 }
 
 /// The accessor of an attribute without its view: of the type that the data has.

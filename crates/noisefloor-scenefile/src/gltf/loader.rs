@@ -5,7 +5,7 @@ use super::material::Materials;
 use super::mesh::{self, Triangles};
 use super::nodes::Placed;
 use super::notes::Notes;
-use super::parts::name;
+use super::parts::{INSTANCES, VISIBILITY, name};
 use super::rest::{self, Joints};
 use super::shared::Shared;
 use super::{camera, light};
@@ -43,14 +43,17 @@ pub(super) struct Loader<'a> {
 impl Loader<'_> {
     pub(super) fn node(&mut self, placed: &Placed<'_>) -> Result<(), LoadError> {
         let Placed { node, place, .. } = placed;
-        self.notes.extensions(place, node.extensions.iter().flat_map(|e| e.others.keys()));
-        if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
+        let read = |name: &&String| [INSTANCES, VISIBILITY].contains(&name.as_str());
+        let others = node.extensions.iter().flat_map(|e| e.others.keys());
+        self.notes.extensions(place, others.filter(|name| !read(name)));
+        let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        if let Some(light) = light.filter(|_| placed.visible) {
             light::add(self.asset, placed, light.light, &mut self.builder, &mut self.notes)?;
         }
-        let Some(index) = node.mesh else { return Ok(()) };
+        let Some(index) = node.mesh.filter(|_| !placed.shown.is_empty()) else { return Ok(()) };
         let mesh = self.asset.get(index, "mesh", place)?;
         let called = name("mesh", index.value(), mesh.name.as_deref());
-        let first = self.meshes.insert(index.value());
+        let mut first = self.meshes.insert(index.value());
         if first {
             let place = Place::part(self.asset.path, &called);
             self.notes.extensions(&place, mesh.extensions.iter().flat_map(|e| e.others.keys()));
@@ -60,16 +63,19 @@ impl Loader<'_> {
             None => None,
         };
         let weights = node.weights.as_ref().or(mesh.weights.as_ref()).map(Vec::as_slice).unwrap_or_default();
-        let pose = Pose { to_world: &placed.to_world, joints: joints.as_deref(), weights };
-        let shining = match self.sharing.contains(&placed.index) {
-            true => self.instance(placed, index.value(), mesh, &called)?,
-            false => None,
-        };
-        for (number, primitive) in mesh.primitives.iter().enumerate() {
-            if shining.as_ref().is_none_or(|shared| shared.shining.contains(&number)) {
-                let place = Place::part(self.asset.path, format_args!("{called}, primitive {number}"));
-                self.primitive(primitive, &pose, first, false, &place)?;
+        for to_world in &placed.shown {
+            let pose = Pose { to_world, joints: joints.as_deref(), weights };
+            let shining = match self.sharing.contains(&placed.index) {
+                true => self.instance(place, to_world, index.value(), mesh, &called)?,
+                false => None,
+            };
+            for (number, primitive) in mesh.primitives.iter().enumerate() {
+                if shining.as_ref().is_none_or(|shared| shared.shining.contains(&number)) {
+                    let place = Place::part(self.asset.path, format_args!("{called}, primitive {number}"));
+                    self.primitive(primitive, &pose, first, false, &place)?;
+                }
             }
+            first = false;
         }
         Ok(())
     }
@@ -206,7 +212,8 @@ impl Loader<'_> {
     /// Shows a mesh that others show, too; none if that must be done without an instance.
     fn instance(
         &mut self,
-        placed: &Placed<'_>,
+        place: &Place,
+        to_world: &DAffine3,
         index: usize,
         mesh: &json::Mesh,
         called: &str,
@@ -214,25 +221,25 @@ impl Loader<'_> {
         let shared = match self.shared.get(&index) {
             Some(shared) => shared.clone(),
             None => {
-                let shared = Rc::new(self.object(mesh, called, &placed.place)?);
+                let shared = Rc::new(self.object(mesh, called, place)?);
                 self.shared.insert(index, shared.clone());
                 shared
             }
         };
-        let DAffine3 { matrix3, translation } = placed.to_world;
+        let DAffine3 { matrix3, translation } = *to_world;
         let rows = [0, 1, 2].map(|i| {
             let [x, y, z] = matrix3.row(i).to_array();
             [x, y, z, translation[i]]
         });
         match self.builder.instance(shared.object, rows) {
             Err(SceneError::Singular) => return Ok(None),
-            shown => shown.map_err(|cause| LoadError::Scene { place: placed.place.clone(), cause })?,
+            shown => shown.map_err(|cause| LoadError::Scene { place: place.clone(), cause })?,
         }
         let [low, high] = shared.bounds;
         if low.cmple(high).all() {
             for corner in 0..8 {
                 let at = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
-                let p = placed.to_world.transform_point3(DVec3::new(at(0), at(1), at(2)));
+                let p = to_world.transform_point3(DVec3::new(at(0), at(1), at(2)));
                 self.bounds = [self.bounds[0].min(p), self.bounds[1].max(p)];
             }
         }

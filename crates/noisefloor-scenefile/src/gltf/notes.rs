@@ -9,7 +9,8 @@ use std::fmt;
 /// read; of `KHR_materials_variants` the material without a variant is shown, as its specification has it.
 const KNOWN: &[&str] = &[
     super::parts::DRACO,
-    super::meshopt::NAME,
+    super::parts::INSTANCES,
+    super::parts::VISIBILITY,
     super::parts::WEBP,
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",

@@ -6,6 +6,10 @@ pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 /// The extension of textures whose image is WebP.
 pub(super) const WEBP: &str = "EXT_texture_webp";
 
+/// The extensions of nodes that hide them, or show their mesh any number of times.
+pub(super) const VISIBILITY: &str = "KHR_node_visibility";
+pub(super) const INSTANCES: &str = "EXT_mesh_gpu_instancing";
+
 /// What the corners of a mesh multiply its colour with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Corners {

@@ -30,7 +30,7 @@ const KINDS: [(&str, &str); 15] = [
 /// the caller gives. What makes one is said where it is met. Objects of other extensions are not looked into:
 /// those are named whole.
 #[rustfmt::skip]
-const KNOWN: [(&str, &[&str]); 44] = [
+const KNOWN: [(&str, &[&str]); 46] = [
     ("", &["accessors", "animations", "asset", "bufferViews", "buffers", "cameras", "extensionsRequired",
         "extensionsUsed", "images", "materials", "meshes", "nodes", "samplers", "scene", "scenes", "skins", "textures"]),
     ("accessors", &["bufferView", "byteOffset", "componentType", "count", "max", "min", "normalized", "sparse", "type"]),
@@ -74,7 +74,9 @@ const KNOWN: [(&str, &[&str]); 44] = [
     ("meshes/primitives", &["attributes", "indices", "material", "mode", "targets"]),
     ("meshes/primitives/targets", &["NORMAL", "POSITION", "TANGENT"]),
     ("nodes", &["camera", "children", "matrix", "mesh", "rotation", "scale", "skin", "translation", "weights"]),
+    ("nodes/EXT_mesh_gpu_instancing", &["attributes"]),
     ("nodes/KHR_lights_punctual", &["light"]),
+    ("nodes/KHR_node_visibility", &["visible"]),
     ("samplers", &["magFilter", "minFilter", "wrapS", "wrapT"]),
     ("scenes", &["nodes"]),
     ("skins", &["inverseBindMatrices", "joints", "skeleton"]),

@@ -18,18 +18,18 @@ pub(super) struct Shared {
 }
 
 /// The indices of nodes that show a mesh at rest which others show, too.
-pub(super) fn sharing(placed: &[Placed<'_>]) -> HashSet<usize> {
-    let mesh = |placed: &&Placed<'_>| {
+pub(super) fn sharing<'p>(placed: &'p [Placed<'_>]) -> HashSet<usize> {
+    let mesh = |placed: &'p Placed<'_>| {
         let plain = placed.node.skin.is_none() && placed.node.weights.is_none();
-        let flat = placed.to_world.matrix3.determinant() == 0.0;
-        placed.node.mesh.filter(|_| plain && !flat).map(|mesh| (mesh.value(), placed.index))
+        let flat = placed.shown.iter().any(|to_world| to_world.matrix3.determinant() == 0.0);
+        placed.node.mesh.filter(|_| plain && !flat).map(|mesh| (mesh.value(), placed))
     };
     let mut shown: HashMap<usize, usize> = HashMap::new();
-    for (mesh, _) in placed.iter().filter_map(|placed| mesh(&placed)) {
-        *shown.entry(mesh).or_default() += 1;
+    for (mesh, placed) in placed.iter().filter_map(mesh) {
+        *shown.entry(mesh).or_default() += placed.shown.len();
     }
-    let all = placed.iter().filter_map(|placed| mesh(&placed));
-    all.filter(|(mesh, _)| shown[mesh] > 1).map(|(_, node)| node).collect()
+    let all = placed.iter().filter_map(mesh);
+    all.filter(|(mesh, _)| shown[mesh] > 1).map(|(_, placed)| placed.index).collect()
 }
 
 /// Whether a primitive of a mesh may shine.

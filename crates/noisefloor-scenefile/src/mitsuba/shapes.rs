@@ -37,7 +37,7 @@ impl<'d> Context<'d> {
     ) -> Result<(), LoadError> {
         self.spend(element, element.children.len())?;
         if instance.is_some() {
-            self.count_made(element, 1, filling)?;
+            self.document.folder.build(1, &self.place(element))?;
         }
         self.no_media(element)?;
         element.ignore(&["silhouette_sampling_weight"]);
@@ -91,9 +91,7 @@ impl<'d> Context<'d> {
                     Some(mesh) => mesh,
                     None => Rc::new(self.triangles(element, mapped)?),
                 };
-                if instance.is_some() || matches!(element.kind(), "sphere" | "cylinder") {
-                    self.count_made(element, mesh.indices.len(), filling)?;
-                }
+                self.document.folder.build(mesh.indices.len() as u64, &self.place(element))?;
                 let Some(to_world) = instance else {
                     return self.add(element, &mesh, filling, material, emission);
                 };
@@ -355,8 +353,6 @@ pub(super) struct Filling<'d> {
     pub(super) materials: HashMap<(usize, bool), (MaterialId, bool)>,
     /// Meshes of groups that shine, by the serial number of their element.
     pub(super) meshes: HashMap<usize, Rc<Triangles>>,
-    /// Triangles that are not in a file but made of what is.
-    pub(super) made: u64,
     /// Spheres that ellipsoids of a material share.
     pub(super) balls: HashMap<MaterialId, ObjectId>,
     /// Whether shapes are added to what the instances of a group share.
@@ -377,14 +373,11 @@ pub(super) struct Group<'d> {
 impl Filling<'_> {
     pub(super) fn new(builder: SceneBuilder) -> Self {
         let (materials, meshes, balls, groups) = Default::default();
-        Self { builder, materials, meshes, made: 0, balls, in_group: false, groups }
+        Self { builder, materials, meshes, balls, in_group: false, groups }
     }
 }
 
 // Groups of shapes, and their instances.
-
-/// Most triangles that are made: of round shapes, and of lamps in instances. A short file can ask for any number.
-const MAX_MADE: u64 = 1 << 23;
 
 impl<'d> Context<'d> {
     /// Shows the shapes of a group, moved.
@@ -445,17 +438,6 @@ impl<'d> Context<'d> {
             self.spend(element, all.len())?;
         }
         Ok(all)
-    }
-
-    /// Counts triangles that are made, and refuses more than [`MAX_MADE`].
-    pub(super) fn count_made(
-        &self,
-        element: &Element,
-        count: usize,
-        filling: &mut Filling<'d>,
-    ) -> Result<(), LoadError> {
-        filling.made = filling.made.saturating_add(count as u64);
-        self.place(element).at_most("triangles made of shapes so far", filling.made, MAX_MADE)
     }
 }
 

@@ -47,9 +47,7 @@ impl Reader<'_> {
             Err(cause) => return Err(refused(cause)),
         }
         for part in &object.parts {
-            if let Form::Mesh(mesh) = &part.form {
-                self.count_made(&part.place, mesh.indices.len() as u64)?;
-            }
+            self.folder.build(part.form.surfaces(), &part.place)?;
             self.add(part.clone(), to_world)?;
         }
         Ok(())
@@ -68,7 +66,8 @@ impl Reader<'_> {
                 }
                 None => {
                     let own = own * DMat4::from_scale(DVec3::splat(radius));
-                    let (mut mesh, own) = self.solid(&place, solids::sphere(), own)?;
+                    let mut mesh = solids::sphere();
+                    self.folder.build(mesh.indices.len() as u64, &place)?;
                     mesh.place(own);
                     mesh
                 }

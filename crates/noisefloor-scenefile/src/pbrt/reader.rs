@@ -30,9 +30,6 @@ const MAX_BYTES: u64 = 1 << 30;
 const MAX_FILES: u64 = 1 << 18;
 /// Longest file of directives that is kept, in bytes: what is included often is short.
 const KEPT: usize = 1 << 16;
-/// Most triangles that are made: by subdivision, of round shapes, and of lamps in instances. A short file can ask
-/// for any number.
-const MAX_MADE: u64 = 1 << 23;
 /// Most warnings that are kept.
 const MAX_WARNINGS: usize = 10_000;
 /// Most pixels of all pictures together.
@@ -65,8 +62,6 @@ pub(super) struct Reader<'a> {
     /// Pixels with a factor above 1, by address and factor, and what they are where 1 is the most. The former stay here,
     /// so that no other ones get their address.
     pub(super) bounded: HashMap<(usize, [u32; 3]), (Pixels, Pixels)>,
-    /// Triangles that are not in the file but made of what is.
-    pub(super) made: u64,
     pub(super) stack: Vec<State>,
     pub(super) transforms: Vec<DMat4>,
     pub(super) coordinate_systems: HashMap<String, DMat4>,
@@ -105,7 +100,6 @@ impl<'a> Reader<'a> {
             bounds: Bounds::default(),
             means: Means::default(),
             bounded: HashMap::new(),
-            made: 0,
             stack: vec![],
             transforms: vec![],
             coordinate_systems: HashMap::new(),
@@ -198,12 +192,6 @@ impl<'a> Reader<'a> {
         for name in unused {
             self.ignored(&params.place, format!("`{name}` of {called} is ignored"));
         }
-    }
-
-    /// Counts triangles that are to be made, and refuses more than [`MAX_MADE`].
-    pub(super) fn count_made(&mut self, place: &Place, count: u64) -> Result<(), LoadError> {
-        self.made = self.made.saturating_add(count);
-        place.clone().at_most("triangles made of shapes so far", self.made, MAX_MADE)
     }
 
     /// Counts pixels that are kept, and refuses more than [`MAX_PIXELS`].

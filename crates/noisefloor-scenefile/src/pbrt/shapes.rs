@@ -11,11 +11,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use noisefloor_ptwne::Texture;
 use std::f64::consts::PI;
 
-/// Most triangles that subdivision makes of a mesh, beside three levels of it, which are usual: a short file can
-/// ask for any number.
-const MAX_SUBDIVIDED: u64 = 1 << 20;
-const USUAL_LEVELS: u32 = 3;
-/// Bytes that each of them takes on the way.
+/// Bytes that a triangle of a subdivision takes on the way.
 const SUBDIVIDING: u64 = 400;
 
 impl Reader<'_> {
@@ -54,6 +50,7 @@ impl Reader<'_> {
             }
             Form::Mesh(mesh)
         };
+        self.folder.build(form.surfaces(), &place)?;
         let emission = match light {
             Some(light) => {
                 if light.power.is_some() && parts_of(kind, &form) > 1 {
@@ -102,21 +99,10 @@ impl Reader<'_> {
             "loopsubdiv" => (self.subdivision(params)?, DMat4::IDENTITY),
             "plymesh" => (self.ply_mesh(params)?, DMat4::IDENTITY),
             "sphere" | "cylinder" | "disk" | "cone" | "paraboloid" | "hyperboloid" => {
-                self.solid(&params.place, quadric(kind, params)?, DMat4::IDENTITY)?
+                (quadric(kind, params)?, DMat4::IDENTITY)
             }
             _ => return Err(params.place.clone().unsupported(format!("Shape \"{kind}\""))),
         })
-    }
-
-    /// A solid as triangles, which are counted.
-    pub(super) fn solid(
-        &mut self,
-        place: &Place,
-        mesh: Triangles,
-        own: DMat4,
-    ) -> Result<(Triangles, DMat4), LoadError> {
-        self.count_made(place, mesh.indices.len() as u64)?;
-        Ok((mesh, own))
     }
 
     /// Where the shape is: a number or a texture, and what to call it.
@@ -179,11 +165,8 @@ impl Reader<'_> {
         let levels = params.float(name)?.unwrap_or(3.0).max(0.0) as u32;
         let mut mesh = Triangles { positions, indices, ..Triangles::default() };
         mesh.check(&params.place)?;
-        let after =
-            |levels| subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
-        let (usual, after) = (after(USUAL_LEVELS), after(levels));
-        params.place.clone().at_most("triangles of a subdivision", after, usual.max(MAX_SUBDIVIDED))?;
-        self.count_made(&params.place, after)?;
+        let after = subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
+        params.place.clone().at_most("triangles of a subdivision", after, self.folder.unbuilt())?;
         has_memory(after, SUBDIVIDING, &params.place)?;
         Ok(subdivide::subdivide(&mesh, levels))
     }

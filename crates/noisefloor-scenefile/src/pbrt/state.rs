@@ -97,6 +97,15 @@ pub(super) enum Form {
     Ball(DMat4, f64),
 }
 
+impl Form {
+    pub(super) fn surfaces(&self) -> u64 {
+        match self {
+            Self::Mesh(mesh) => mesh.indices.len() as u64,
+            Self::Ball(..) => 1,
+        }
+    }
+}
+
 /// A defined object: parts that its instances do not share, and what they do.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Object {

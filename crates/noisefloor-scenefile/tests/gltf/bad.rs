@@ -89,7 +89,7 @@ fn every_error_names_its_place() {
         // Lengths
         ("/accessors/0/count", "5", table, "accessor 0: 5 elements of 12 bytes"),
         ("/accessors/0/count", "18446744073709551615", table, "vertices up to here"),
-        ("/accessors/2/count", "18446744073709551615", table, "triangles up to here"),
+        ("/accessors/2/count", "18446744073709551615", table, "surfaces so far"),
         ("/accessors/1/count", "18446744073709551615", table, "4 positions, but 18446744073709551615"),
         ("/accessors/0/byteOffset", "4", table, "accessor 0: 4 elements of 12 bytes"),
         ("/accessors/0/byteOffset", "18446744073709551615", table, "accessor 0"),
@@ -143,9 +143,9 @@ fn every_error_names_its_place() {
         ("/asset/version", "2", "asset: ", "not the JSON of a glTF file"),
         (
             "/extensionsRequired",
-            r#"["EXT_mesh_gpu_instancing"]"#,
+            r#"["EXT_meshopt_compression"]"#,
             "extensionsRequired: ",
-            "EXT_mesh_gpu_instancing",
+            "EXT_meshopt_compression",
         ),
         ("/scenes", "[]", "scene.gltf: ", "scene 0 does not exist"),
     ] {
@@ -195,7 +195,7 @@ fn nothing_is_allocated_for_what_is_only_claimed() {
         maker.node(&format!(r#"{{"mesh": {other}}}"#));
     }
     let error = maker.load().unwrap_err();
-    assert!(matches!(error, LoadError::TooLarge { what: "triangles up to here", .. }), "{error}");
+    assert!(matches!(error, LoadError::TooLarge { what: "surfaces so far", .. }), "{error}");
 
     // An image whose header claims 2³⁰ pixels
     let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x80\0\0\0\x80\0\x08\x02\0\0\0".to_vec();

@@ -2,6 +2,7 @@
 
 use crate::kit::{Maker, assert_warns, json, render};
 use crate::materials::{assert_close, linear, mean, near, wall};
+use noisefloor_scenefile::Loaded;
 
 /// A distant light along −z: what a wall of normal n reflects of it is Lambert's cosine.
 fn sunlit(material: &str) -> Maker {
@@ -19,6 +20,9 @@ fn sunlit(material: &str) -> Maker {
 /// A diffuse surface: a coat of index 1.001 reflects nothing.
 const CHALK: &str =
     r#""pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {"KHR_materials_ior": {"ior": 1.001}}"#;
+
+const CHALK_ALONE: &str =
+    r#"{"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {"KHR_materials_ior": {"ior": 1.001}}}"#;
 
 #[test]
 fn normal_maps_turn_the_normal() {
@@ -240,9 +244,102 @@ fn compressed_pictures_and_meshes_are_refused_by_name() {
     let error = maker.load().unwrap_err().to_string();
     assert!(error.contains("a mesh of only EXT_other_compression is not supported"), "{error}");
     let mut maker = wall("{}");
-    maker.root["extensionsRequired"] = json(r#"["KHR_texture_basisu", "EXT_mesh_gpu_instancing"]"#);
+    maker.root["extensionsRequired"] = json(r#"["KHR_texture_basisu", "EXT_meshopt_compression"]"#);
     let error = maker.load().unwrap_err().to_string();
-    assert!(error.contains("KHR_texture_basisu, EXT_mesh_gpu_instancing"), "{error}");
+    assert!(error.contains("KHR_texture_basisu, EXT_meshopt_compression"), "{error}");
+}
+
+/// Hidden nodes hide all below them, lamps as well, but no cameras.
+#[test]
+fn hidden_nodes_are_not_seen() {
+    let mut maker = Maker::new();
+    maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, r#"{"emissiveFactor": [1, 1, 1]}"#);
+    maker.root["extensions"]["KHR_lights_punctual"]["lights"] = json(r#"[{"type": "point"}]"#);
+    let hidden = r#""KHR_node_visibility": {"visible": false}"#;
+    let children = [
+        r#"{"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": true}}}"#,
+        r#"{"extensions": {"KHR_lights_punctual": {"light": 0}}}"#,
+    ];
+    let children = children.map(|child| maker.push("nodes", child));
+    maker.root["nodes"][0]["extensions"] = json(&format!("{{{hidden}}}"));
+    let parent =
+        maker.node(&format!(r#"{{"mesh": 0, "children": {children:?}, "extensions": {{{hidden}}}}}"#));
+    maker.root["extensionsUsed"] = json(r#"["KHR_node_visibility", "KHR_lights_punctual"]"#);
+    let seen = |maker: &Maker| {
+        let Loaded { scene, warnings, .. } = maker.load().unwrap();
+        assert!(!warnings.iter().any(|w| w.to_string().contains("KHR_node")), "{warnings:?}");
+        (scene.surfaces(), scene.lights())
+    };
+    assert_eq!(seen(&maker), (0, 0));
+    maker.root["nodes"][parent].as_object_mut().unwrap().remove("extensions");
+    assert_eq!(seen(&maker), (4, 5));
+}
+
+/// Three squares of one mesh: where translations, rotations and scales say, relative to the node; with a lamp of the node
+/// that is there once.
+#[test]
+fn instances_are_seen_where_they_are() {
+    for (material, shining) in [(r#"{"emissiveFactor": [1, 1, 1]}"#, true), (CHALK_ALONE, false)] {
+        let make = |node: &dyn Fn(&mut Maker, usize)| {
+            let mut maker = Maker::new();
+            let mesh = maker.rectangle([-0.25, 0.25], [-0.25, 0.25], 0.0, material);
+            maker.root["extensions"]["KHR_lights_punctual"]["lights"] =
+                json(r#"[{"type": "point", "intensity": 3}]"#);
+            maker.node(r#"{"extensions": {"KHR_lights_punctual": {"light": 0}}}"#);
+            node(&mut maker, mesh);
+            maker
+        };
+        // Turned by 90° around the view, and of half the width
+        let turn = 0.5f32.sqrt();
+        let places: [([f32; 3], [f32; 4], [f32; 3]); 3] = [
+            ([-0.5, 0.5, -1.0], [0.0, 0.0, 0.0, 1.0], [1.0; 3]),
+            ([0.5, 0.5, -1.0], [0.0, 0.0, turn, turn], [0.5, 1.0, 1.0]),
+            ([0.0, -0.5, -1.0], [0.0, 0.0, 0.0, 1.0], [1.5, 0.5, 1.0]),
+        ];
+        let instanced = make(&|maker, mesh| {
+            let translations = maker.floats(&places.map(|(t, ..)| [t[0] - 0.1, t[1], t[2]]));
+            let (rotations, scales) =
+                (maker.floats(&places.map(|p| p.1)), maker.floats(&places.map(|p| p.2)));
+            maker.node(&format!(
+                r#"{{"mesh": {mesh}, "translation": [0.1, 0, 0], "extensions": {{"EXT_mesh_gpu_instancing":
+                    {{"attributes": {{"TRANSLATION": {translations}, "ROTATION": {rotations}, "SCALE": {scales},
+                        "_ID": {scales}}}}}}}}}"#
+            ));
+            maker.root["extensionsUsed"] = json(r#"["EXT_mesh_gpu_instancing", "KHR_lights_punctual"]"#);
+            maker.root["extensionsRequired"] = json(r#"["EXT_mesh_gpu_instancing"]"#);
+        });
+        let apart = make(&|maker, mesh| {
+            for (t, r, s) in places {
+                maker.node(&format!(
+                    r#"{{"mesh": {mesh}, "translation": {t:?}, "rotation": {r:?}, "scale": {s:?}}}"#
+                ));
+            }
+        });
+        let loaded = instanced.load().unwrap();
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+        assert_eq!(loaded.scene.instances(), if shining { 0 } else { 3 });
+        let (found, expected) = (render(loaded, 8, 4, 2), render(apart.load().unwrap(), 8, 4, 2));
+        assert!(expected.iter().filter(|pixel| pixel[0] > 0.1).count() > 6, "{shining} {expected:?}");
+        for (found, expected) in found.iter().zip(&expected) {
+            assert_close(*found, *expected, 1e-5);
+        }
+    }
+
+    let mut maker = Maker::new();
+    let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, "{}");
+    let [two, three] = [maker.floats(&[[0.0f32; 3]; 2]), maker.floats(&[[1.0f32; 3]; 3])];
+    maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    let many = maker.push("accessors", r#"{"componentType": 5126, "type": "VEC3", "count": 4000000000}"#);
+    for (attributes, what) in [
+        (format!(r#"{{"TRANSLATION": {two}, "SCALE": {three}}}"#), "its attributes differ in number"),
+        (format!(r#"{{"SCALE": {many}}}"#), "inflated bytes so far, more than"),
+        ("null".into(), "it needs `attributes`"),
+    ] {
+        let extension = format!(r#"{{"EXT_mesh_gpu_instancing": {{"attributes": {attributes}}}}}"#);
+        maker.root["nodes"][1]["extensions"] = json(&extension);
+        let error = maker.load().unwrap_err().to_string();
+        assert!(error.contains("node 1: ") && error.contains(what), "{error}");
+    }
 }
 
 /// WebP pictures, losslessly compressed, with a PNG for other readers or without.

@@ -199,18 +199,18 @@ fn what_is_ignored_is_named() {
     primitive["extensions"] = json(r#"{"EXT_primitive": {}}"#);
     maker.root["meshes"][0]["name"] = "Table".into();
     maker.root["nodes"][1]["name"] = "Legs".into();
-    maker.root["nodes"][1]["extensions"] = json(r#"{"EXT_mesh_gpu_instancing": {}}"#);
+    maker.root["nodes"][1]["extensions"] = json(r#"{"EXT_node_elsewhere": {}}"#);
     maker.push("animations", r#"{"name": "walk", "channels": [], "samplers": []}"#);
     // The mesh again: warnings about it come once
     maker.node(r#"{"mesh": 0}"#);
     maker.root["extensionsUsed"] =
-        json(r#"["EXT_primitive", "EXT_mesh_gpu_instancing", "EXT_elsewhere", "KHR_mesh_quantization"]"#);
+        json(r#"["EXT_primitive", "EXT_node_elsewhere", "EXT_elsewhere", "KHR_mesh_quantization"]"#);
     let loaded = maker.load().unwrap();
     for parts in [
         [r#"mesh 0 "Table", primitive 0"#, "second set of vertex colours"],
         [r#"mesh 0 "Table", primitive 0"#, "joints beyond four"],
         [r#"mesh 0 "Table", primitive 0"#, "EXT_primitive"],
-        [r#"node 1 "Legs""#, "EXT_mesh_gpu_instancing"],
+        [r#"node 1 "Legs""#, "EXT_node_elsewhere"],
         [r#"animation 0 "walk""#, "ignored"],
         ["extensionsUsed", "EXT_elsewhere"],
     ] {

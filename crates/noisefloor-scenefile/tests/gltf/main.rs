@@ -15,4 +15,3 @@ mod geometry; // where triangles and cameras are
 mod kit;
 mod lights; // lights without size
 mod materials; // what surfaces look like
-mod meshopt; // compressed buffer views
