@@ -72,6 +72,9 @@ impl Lanes {
 /// 2013, "Robust BVH Ray Traversal").
 const LATE: f32 = 1.000_001;
 
+/// A box that the ray leaves where it begins has nothing ahead, as those of all surfaces in the plane of a lamp.
+const AHEAD: f32 = f32::MIN_POSITIVE;
+
 impl Node {
     pub(super) const EMPTY: Self =
         Self { bounds: [[Lanes::splat(f32::MAX), Lanes::splat(f32::MIN)]; 3], child: [LEAF; WIDTH] };
@@ -86,7 +89,7 @@ impl Node {
             };
             let near = |i: usize| at(i, ray.enter[i]);
             let far = |i: usize| at(i, 1 - ray.enter[i]);
-            let enter = near(0).max(near(1)).max(near(2).max(Vec4::ZERO));
+            let enter = near(0).max(near(1)).max(near(2).max(Vec4::splat(AHEAD)));
             let leave = far(0).min(far(1)).min(far(2)) * LATE;
             (enter, enter.cmple(leave.min(Vec4::splat(t_max))).bitmask())
         };
@@ -108,7 +111,7 @@ impl Node {
         let near = |i: usize| at(i, ray.enter[i]);
         let far = |i: usize| at(i, 1 - ray.enter[i]);
         let enter =
-            _mm256_max_ps(_mm256_max_ps(near(0), near(1)), _mm256_max_ps(near(2), _mm256_setzero_ps()));
+            _mm256_max_ps(_mm256_max_ps(near(0), near(1)), _mm256_max_ps(near(2), _mm256_set1_ps(AHEAD)));
         let leave = _mm256_min_ps(_mm256_min_ps(far(0), far(1)), far(2));
         let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LATE));
         let leave = _mm256_min_ps(leave, _mm256_set1_ps(t_max));

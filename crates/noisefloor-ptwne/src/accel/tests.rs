@@ -1,7 +1,7 @@
 //! The hierarchy against a loop over all surfaces.
 
 use super::bvh::LocalHit;
-use super::node::Node;
+use super::node::{Node, WideRay};
 use super::tree::Waiting;
 use super::{Bvh, Hierarchy, Shape, Surface};
 use crate::geometry::NO;
@@ -166,6 +166,30 @@ fn instructions_leave_no_trace_in_a_hit() {
         hits += usize::from(hit.slot != NO);
     }
     assert!(hits > 5000, "{hits}");
+}
+
+/// A ray that begins in the plane of many lamps, as a camera between them, looks at none of them.
+#[test]
+fn what_lies_where_a_ray_begins_is_not_looked_at() {
+    let flat = |z: f32| Shape::Planar {
+        corner: glam::Vec3::new(-1.0, -1.0, z),
+        e1: glam::Vec3::X * 2.0,
+        e2: glam::Vec3::Y * 2.0,
+        whole: true,
+    };
+    let shapes = [vec![flat(0.0); 20_000], vec![flat(-1.0)]].concat();
+    let bvh = built(&shapes);
+    let ray = Ray { origin: Vec3::new(0.1, 0.2, 0.0), dir: Vec3::new(0.3, 0.1, -0.9).normalize() };
+    let wide = WideRay::new(&ray);
+    let mut waiting = Waiting::new(bvh.tree.waiting);
+    let mut looked = 0;
+    bvh.tree.nearest(&wide, f32::INFINITY, &mut waiting, Node::meet, |_| {
+        looked += 1;
+        f32::INFINITY
+    });
+    assert!(looked < 10, "{looked}");
+    let hit = bvh.closest(&ray, f32::INFINITY, &mut waiting, |_, _| true);
+    assert!((hit.t - ray.dir.z.recip().abs()).abs() < 1e-5, "{}", hit.t);
 }
 
 /// Both ways to meet boxes agree to the bit where a ray runs along a side of a box, or a box is empty.
