@@ -23,6 +23,10 @@ use std::path::Path;
 const MAX_EXPANSION: u64 = 1376;
 /// Pixels of black around a data window that every file may have; longer files may have more.
 const FREE_PIXELS: u64 = 1 << 24;
+/// Bytes of channels beside the colours that every file may have, and that a longer file may have for each of its own: a
+/// block is inflated as a whole. Noise becomes at most some 4 of a byte, and passes without any are rarely all.
+const FREE_BESIDE: u64 = 1 << 30;
+const BESIDE_A_BYTE: u64 = 64;
 /// Largest block (tile or group of scan lines, all channels) that is decompressed, in bytes.
 const MAX_BLOCK_BYTES: usize = 1 << 30;
 /// Most channels named in an error message.
@@ -113,6 +117,15 @@ fn decode_unguarded(path: &Path, opened: Opened, choose: Chooser) -> Result<Line
     if decoded > budget || shown > FREE_PIXELS.saturating_add(budget) {
         let (width, height) = (window.width, window.height);
         return Err(broken(format!("{} bytes cannot hold {width}×{height} pixels", opened.bytes)));
+    }
+
+    let beside = decoded.saturating_sub(shown.saturating_mul(size_of::<Rgb>() as u64));
+    if beside > opened.bytes.saturating_mul(BESIDE_A_BYTE).saturating_add(FREE_BESIDE) {
+        return Err(PictureError::Unsupported {
+            path: path.to_owned(),
+            what: "the channels beside its colours are out of proportion to the file",
+            advice: "save the picture by itself",
+        });
     }
 
     // Pixels start black, if there is memory for them
@@ -343,9 +356,6 @@ fn subsampled(path: &Path) -> PictureError {
 
 fn check_part(path: &Path, part: &Header, most: usize) -> Result<(), PictureError> {
     let unsupported = |what, advice| Err(PictureError::Unsupported { path: path.to_owned(), what, advice });
-    if part.deep {
-        return unsupported("deep pixels are not read", "flatten the image");
-    }
     if part.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1) {
         return Err(subsampled(path));
     }

@@ -74,6 +74,11 @@ impl Opened {
         reader.rewind().map_err(io)?;
         let format = match start.as_slice() {
             [] => Format::Empty,
+            // A flag of the version; the decoder takes deep parts for broken ones
+            [0x76, 0x2f, 0x31, 0x01, _, flags, ..] if flags & 8 != 0 => {
+                let (what, advice) = ("deep pixels are not read", "flatten the image");
+                return Err(PictureError::Unsupported { path: path.to_owned(), what, advice });
+            }
             [0x76, 0x2f, 0x31, 0x01, ..] => Format::Exr,
             [b'P', b'F' | b'f', b'\n' | b'\r', ..] => Format::Pfm,
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Format::Png,

@@ -102,6 +102,36 @@ fn a_few_bytes_cannot_be_many_pixels() {
     assert_eq!(read_picture(&path).unwrap().size(), (3840, 2160));
 }
 
+/// Blocks hold all channels: too many that nobody asks for are refused before any is inflated.
+#[test]
+fn channels_beside_the_picture_are_in_proportion_to_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hostile.exr");
+    let black = vec![0.0; 512 * 512];
+    let names: Vec<String> = (0..1200).map(|i| format!("pass{i}.V")).collect();
+    let passes = |count: usize| {
+        let passes = names[..count].iter().map(String::as_str);
+        let channels = passes.chain(["R", "G", "B"]).map(|name| (name, f32s(&black))).collect();
+        make_exr(&path, (512, 512), channels, Compression::ZIP16, (0, 0), None);
+        read_picture(&path).map(|picture| picture.size())
+    };
+    assert_eq!(passes(100).unwrap(), (512, 512));
+    let error = passes(1200).unwrap_err().to_string();
+    assert!(error.contains("out of proportion to the file; save the picture by itself"), "{error}");
+}
+
+/// A flag of the version says that pixels are deep.
+#[test]
+fn deep_pixels_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("deep.exr");
+    let mut bytes = exr_claiming(16, 16);
+    bytes[5] |= 8;
+    std::fs::write(&path, bytes).unwrap();
+    let error = read_picture(&path).unwrap_err().to_string();
+    assert!(error.ends_with("deep.exr: deep pixels are not read; flatten the image"), "{error}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1500))]
     #[test]
