@@ -50,9 +50,9 @@ impl Guard {
         }
     }
 
-    /// The Host header, if it names this server, with or without a port.
-    fn known_host(&self, headers: &HeaderMap) -> Option<String> {
-        let host = headers.get(HOST)?.to_str().ok()?.to_lowercase();
+    /// A host, in lower case, if it is this server, with or without a port.
+    fn known(&self, host: &str) -> Option<String> {
+        let host = host.to_lowercase();
         let without_port = host.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok());
         let name = without_port.map_or(&host[..], |(name, _)| name);
         // Browsers leave out the port that is usual
@@ -138,7 +138,12 @@ fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
     if let Some(name) = ["Host", "Origin", "Sec-Fetch-Site", "Content-Type"].iter().find(|name| twice(name)) {
         return refuse(StatusCode::BAD_REQUEST, "the header is there twice", name, "send it once");
     }
-    let Some(host) = guard.known_host(headers) else {
+    // Of a target with a host, that one counts, and not the header (RFC 9112, §3.2.2)
+    let named = match request.uri().authority() {
+        Some(authority) => Some(authority.as_str()),
+        None => headers.get(HOST).and_then(|host| host.to_str().ok()),
+    };
+    let Some(host) = named.and_then(|host| guard.known(host)) else {
         let do_ = "open the address that `noisefloor` printed, or the machine's address if it listens on all; \
             `study serve` and `explore` take further names with --allow-host";
         let what = "this server does not go by that name";
@@ -217,16 +222,16 @@ mod tests {
             ("localhost:80", false),
             ("evil.example", false),
         ] {
-            assert_eq!(guard.known_host(&headers(&[("host", host)])).is_some(), known, "{host}");
+            assert_eq!(guard.known(host).is_some(), known, "{host}");
         }
     }
 
     /// Listening on all addresses, it goes by each of them, and by no name that it was not given.
     #[test]
     fn addresses_of_the_machine_are_known_where_it_listens_on_all() {
-        let knows = |listening: [u8; 4], host: &'static str| {
+        let knows = |listening: [u8; 4], host: &str| {
             let guard = Guard::new((listening, 8437).into(), &Exposure::default());
-            guard.known_host(&headers(&[("host", host)])).is_some()
+            guard.known(host).is_some()
         };
         for (host, known) in [
             ("192.168.1.5:8437", true),
@@ -253,7 +258,24 @@ mod tests {
             ([0, 0, 0, 0], "evil.example", false),
         ] {
             let guard = Guard::new((listening, 80).into(), &Exposure::default());
-            assert_eq!(guard.known_host(&headers(&[("host", host)])).is_some(), known, "{host}");
+            assert_eq!(guard.known(host).is_some(), known, "{host}");
+        }
+    }
+
+    /// `GET http://other.example/` with the right header means another server all the same.
+    #[test]
+    fn the_host_of_a_target_counts_before_the_header() {
+        let guard = Guard::new(([127, 0, 0, 1], 8437).into(), &Exposure::default());
+        for (target, host, known) in [
+            ("/", "localhost:8437", true),
+            ("http://localhost:8437/", "localhost:8437", true),
+            ("http://localhost:8437/", "other.example", true),
+            ("http://other.example/", "localhost:8437", false),
+            ("http://localhost@other.example/", "localhost:8437", false),
+        ] {
+            let request = Request::builder().uri(target).header(HOST, host).body(Default::default()).unwrap();
+            let refusal = foreign(&guard, "http", &request).map(|refusal| refusal.into_response().status());
+            assert_eq!(refusal, (!known).then_some(StatusCode::MISDIRECTED_REQUEST), "{target} {host}");
         }
     }
 
