@@ -18,11 +18,14 @@ impl<'py> FromPyObject<'_, 'py> for Pixels<'py> {
         let array = array(object)?;
         let (kind, name) = dtype(&array)?;
         if kind != 'f' {
-            let message = format!(
-                "pixels of dtype {name} are no radiance: pass linear floats, or to judge() and metrics() \
-                 also encoding=\"srgb\""
-            );
-            return Err(PictureError::new_err(message));
+            // bfloat16 and the like of ml_dtypes are void to numpy
+            let instead = match kind {
+                'V' => "are no floats of numpy: pass array.astype(\"float32\")",
+                _ => {
+                    "are no radiance: pass linear floats, or to judge() and metrics() also encoding=\"srgb\""
+                }
+            };
+            return Err(PictureError::new_err(format!("pixels of dtype {name} {instead}")));
         }
         Ok(Self(floats(&array)?))
     }

@@ -806,6 +806,7 @@ class Errors(unittest.TestCase):
         session = nf.Session(96, 80, params=PARAMS)
         black = np.zeros((EDGE, EDGE, 3), np.float32)
         bytes_of = np.zeros((EDGE, EDGE, 3), np.uint8)
+        void = black.view("V4")  # the kind of bfloat16, as ml_dtypes has it
         elsewhere = nf.Session(200, 80, params=PARAMS).requests()[4].tile
         cases = [
             (nf.SizeError, r"\(16, 32, 3\), and tile 0 is \(32, 32, 3\)", lambda: session.push(0, 1, black[:16])),
@@ -842,6 +843,7 @@ class Errors(unittest.TestCase):
             (nf.BatchError, "of another session: here it is", lambda: session.push(elsewhere, 1, black)),
             (nf.PictureError, "dtype uint8 are no radiance", lambda: session.push(0, 1, bytes_of)),
             (nf.PictureError, "masked", lambda: session.push(0, 1, np.ma.masked_less(np.zeros((EDGE, EDGE, 3)), 1))),
+            (nf.PictureError, r'dtype void32 are no floats.*astype\("float32"\)', lambda: session.push(0, 1, void)),
             (nf.PictureError, "dtype int64", lambda: session.push(0, 1, bytes_of.astype(int))),
             (nf.PictureError, "dtype uint8", lambda: nf.metrics(bytes_of, bytes_of)),
             (nf.PictureError, "dtype uint8", lambda: nf.judge(bytes_of, 8, bytes_of, 8)),
