@@ -71,8 +71,9 @@ fn start(
     })
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
+    #![cfg(unix)]
     use super::*;
     use crate::plan::Task;
     use std::os::unix::fs::PermissionsExt;

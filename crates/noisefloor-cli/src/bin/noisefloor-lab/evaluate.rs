@@ -9,6 +9,7 @@ use noisefloor::{Model, People};
 use noisefloor_cli::files::write_json;
 use noisefloor_cli::say::say;
 use noisefloor_image::{check_writable, write_csv};
+use noisefloor_lab::figures::write_figures;
 use noisefloor_lab::rivals::RatedRival;
 use noisefloor_learn::{Chosen, Evaluation, Prediction, Table, TrainParams, predict};
 use noisefloor_rivals::Rival;
@@ -51,15 +52,18 @@ pub fn run(job: &EvaluateJob) -> anyhow::Result<()> {
     let table = if job.nested { job.data.load_choices()? } else { table(job)? };
     let params = job.search.params(&table);
     let Predicted { by, predictions, choices } = predict_zones(job, &table, &params)?;
-    let report =
-        Report { evaluation: Evaluation::new(by, &table, &predictions), choices, rivals: rivals::rate(job)? };
+    let rivals = rivals::rate(&job.data, &job.rivals)?;
+    let report = Report { evaluation: Evaluation::new(by, &table, &predictions), choices, rivals };
     if let Some(path) = &job.json {
         write_json(path, &report)?;
     }
     if let Some(path) = &job.csv {
         write_csv(path, predictions.iter())?;
     }
-    rivals::draw(job, &predictions, &report)?;
+    if let Some(folder) = &job.figures {
+        write_figures(folder, job.data.corpora(), &predictions, &report.evaluation.reliability)?;
+        rivals::draw(folder, &predictions, &report.rivals)?;
+    }
     tables::say_scores(&report.evaluation)?;
     tables::say_choices(&report.choices)?;
     if !report.rivals.is_empty() {

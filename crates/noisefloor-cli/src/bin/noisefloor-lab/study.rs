@@ -5,14 +5,13 @@ mod stack;
 
 use anyhow::Context;
 use noisefloor_cli::say::{say, say_json};
-use noisefloor_cli::sources::{Resources, SourceJob};
 use noisefloor_pages::http::{Exposure, interrupted};
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::raw::write_raw;
 use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse};
 use noisefloor_study::simulated::{Public, drive};
 use noisefloor_study::{Study, StudyServer, store};
-pub use stack::StackDenoiser;
+pub use stack::{StackDenoiser, StackJob};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -30,15 +29,6 @@ pub enum StudyJob {
     Backup(BackupJob),
     Export(ObserverJob),
     Erase(ObserverJob),
-}
-
-pub struct StackJob {
-    pub source: SourceJob,
-    pub resources: Resources,
-    pub levels: Vec<u64>,
-    /// What all levels but the last pass through.
-    pub denoise: Option<StackDenoiser>,
-    pub out: PathBuf,
 }
 
 pub struct ServeJob {

@@ -1,13 +1,15 @@
 //! `noisefloor-lab train`.
 
 mod disagreements;
+mod say;
 
 use crate::learning::{DataJob, SearchJob, held_out};
-use noisefloor::{Model, People, model::Scores, svm::Machine};
-use noisefloor_cli::say::{NotSaid, note, say};
+use noisefloor::People;
+use noisefloor_cli::say::note;
 use noisefloor_image::{check_writable, write_atomic};
 use noisefloor_learn::{score, train, write_table};
-use std::path::{Path, PathBuf};
+use say::{say_model, say_scores};
+use std::path::PathBuf;
 
 /// What to train on, and how: checked.
 pub struct TrainJob {
@@ -36,7 +38,7 @@ pub fn run(job: &TrainJob) -> anyhow::Result<()> {
     }
     let params = job.search.params(&table);
     if let Some(database) = &job.disagreements {
-        return disagreements::run(job, &table, &params, database);
+        return disagreements::run(&job.data, &job.out, &table, &params, database);
     }
 
     // Scores on scenes left out, where there are enough to leave one out and still choose among the others.
@@ -52,28 +54,4 @@ pub fn run(job: &TrainJob) -> anyhow::Result<()> {
     say_model(&model, &job.out)?;
     scores.map_or(Ok(()), |scores| say_scores("", scores))?;
     Ok(())
-}
-
-fn say_model(model: &Model, out: &Path) -> Result<(), NotSaid> {
-    say!(
-        "{} from {} examples, C = {}, γ = {}; written to {}",
-        match &model.classifier().machine {
-            Machine::Line(_) => "a line".to_owned(),
-            Machine::Svm(svm) => format!("{} support vectors", svm.coefficients.len()),
-        },
-        model.record().examples,
-        model.record().c,
-        model.record().gamma,
-        out.display()
-    )
-}
-
-fn say_scores(when: &str, s: Scores) -> Result<(), NotSaid> {
-    say!(
-        "{when}on left-out scenes: error factor {:.3}, bias factor {:.3}, {:.1} % of {} zones stopped below half",
-        s.error_factor,
-        s.bias_factor,
-        100.0 * s.early_share,
-        s.zones
-    )
 }

@@ -1,23 +1,23 @@
 //! `noisefloor judge`.
 
 mod denoised;
+mod read;
 mod report;
 
 pub use denoised::DenoisedJob;
+pub use read::warn_unread;
 
 use anyhow::Context;
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     evidence::{Evidence, Samples},
-    stills::{JudgedTiles, SnapshotPair, Still, StillError, StillWarning},
+    stills::{JudgedTiles, SnapshotPair, Still, StillError},
 };
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::start_threads;
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
-use noisefloor_image::{
-    Plane, ReadOptions, RenderLayers, SampleFacts, check_writable, read_facts, read_still_with, read_unread,
-    write_exr,
-};
+use noisefloor_image::{Plane, ReadOptions, RenderLayers, SampleFacts, check_writable, write_exr};
+use read::{read, warn_of};
 use report::Row;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -98,37 +98,6 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
     let rows = rows(grid, image.spp, &judged, &unlike);
     report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
     draw(job, &image, grid, (&held, &judged), &rows)
-}
-
-/// A picture that can be judged; errors name it.
-fn read((path, spp): &(PathBuf, Option<f64>), options: &ReadOptions) -> anyhow::Result<Still> {
-    let still = read_still_with(path, *spp, options)?;
-    if let (Some(typed), Some(said)) = (spp, read_facts(path)?.spp())
-        && *typed != said as f64
-    {
-        note!(
-            "note: {} says that it has {said} samples per pixel; --spp {typed} overrides it",
-            path.display()
-        );
-    }
-    warn_unread(path, options)?;
-    still.check().with_context(|| format!("{}", path.display()))?;
-    Ok(still)
-}
-
-/// Says what is not read of a picture.
-pub(crate) fn warn_unread(path: &Path, options: &ReadOptions) -> anyhow::Result<()> {
-    for what in read_unread(path, options)?.warnings() {
-        note!("warning: {}: {what}", path.display());
-    }
-    Ok(())
-}
-
-/// Says what is likely wrong with two pictures.
-fn warn_of(warnings: &[StillWarning]) {
-    for what in warnings {
-        note!("warning: {what}");
-    }
 }
 
 /// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.

@@ -1,53 +1,25 @@
 //! `noisefloor tune`.
 
+mod job;
 mod keep;
 mod pictures;
 
+pub use job::{TuneCriterion, TuneJob};
+
+use crate::tune::job::{Row, TILE};
 use crate::tune::keep::{Keep, KeptSearch};
 use crate::tune::pictures::{Crop, Judged, Judges, Pair, View};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Tuning, Viewer, drive};
-use noisefloor::{Audience, Oracle, Params, Tile, ToneMapping, Viewing};
+use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Viewer, drive};
+use noisefloor::{Params, Tile, ToneMapping};
 use noisefloor_cli::folder::Earlier;
-use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::{note, say, say_json};
 use noisefloor_cli::signals::end_on_signal;
-use noisefloor_cli::sources::{Resources, SourceJob};
-use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use serde::Serialize;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-
-/// A setting to find: checked.
-pub struct TuneJob {
-    pub source: SourceJob,
-    /// The frames of a sequence that are looked at; none if it is one picture.
-    pub frames: Vec<i32>,
-    /// Crops that are rendered after the first setting; 0 for the whole picture.
-    pub regions: usize,
-    pub resources: Resources,
-    pub tuning: Tuning,
-    /// Most samples per pixel of a picture with a threshold.
-    pub most_spp: Option<u64>,
-    pub criterion: TuneCriterion,
-    pub tone: Tone,
-    pub viewing: Viewing,
-    pub audience: Audience,
-    pub keep: Option<PathBuf>,
-    pub earlier: Earlier,
-    pub json: bool,
-    pub quiet: bool,
-}
-
-/// What is judged.
-pub enum TuneCriterion {
-    /// The noise of the picture.
-    Noise(Box<Oracle>),
-    /// What is wrong with the denoised picture, in JODs that its worst square may have lost.
-    Denoised { lost: f64, device: Option<String> },
-}
 
 /// What is sought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -56,36 +28,6 @@ pub enum KnobChoice {
     Threshold,
     /// Samples per pixel.
     Samples,
-}
-
-/// One line of the search.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Row {
-    /// One picture with it is as good as the mean of the two, if noise follows the setting.
-    setting: f64,
-    /// What each of the two was rendered with.
-    each: f64,
-    /// What is wrong in the worst place, over what may be; null where it cannot be told.
-    ratio: Option<f64>,
-    /// The same of one picture whose threshold is finer by √2, and whether that changes next to nothing; where the renderer
-    /// tells how many samples pixels have.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    alone: Option<f64>,
-    #[serde(default)]
-    still: bool,
-    /// The worst place, and the frame of a sequence that has it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    frame: Option<i32>,
-    x: Option<usize>,
-    y: Option<usize>,
-    /// How many crops stood for the whole; 0 if it was judged itself.
-    #[serde(default)]
-    crops: usize,
-    /// Follows from the pictures, so that equal ones are known ([`Excess::pictures`]).
-    pictures: u64,
-    /// For both pictures, and what judging them took.
-    seconds: f64,
-    judging_seconds: f64,
 }
 
 #[derive(Serialize)]
@@ -318,9 +260,6 @@ impl Row {
         excess.with_alone(self.alone).with_still(self.still)
     }
 }
-
-/// Edge of the tiles in which noise is described: windows are what is judged, whatever the tiles.
-const TILE: usize = 64;
 
 fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
     let what = match (&job.criterion, row.ratio) {

@@ -1,32 +1,30 @@
 //! Other criteria on the same zones, and figures.
 
-use super::{EvaluateJob, Report};
 use crate::bars::Bars;
+use crate::learning::DataJob;
 use noisefloor::model::Scores;
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_image::write_atomic;
-use noisefloor_lab::figures::write_figures;
 use noisefloor_lab::rivals::{self, RatedRival, mean, plot_scene_means};
 use noisefloor_learn::{Prediction, score};
+use noisefloor_rivals::Rival;
 use std::io::Write;
+use std::path::Path;
 
-pub(super) fn rate(job: &EvaluateJob) -> anyhow::Result<Vec<RatedRival>> {
-    if job.rivals.is_empty() {
+pub(super) fn rate(data: &DataJob, asked: &[&'static Rival]) -> anyhow::Result<Vec<RatedRival>> {
+    if asked.is_empty() {
         return Ok(Vec::new());
     }
     let bars = Bars::new(false);
-    let rated =
-        rivals::rate(job.data.corpora(), &job.rivals, job.data.viewing, &|advance| bars.show(advance))?;
+    let rated = rivals::rate(data.corpora(), asked, data.viewing, &|advance| bars.show(advance))?;
     bars.finish();
     Ok(rated)
 }
 
-/// Draws what `--figures` asks for.
-pub(super) fn draw(job: &EvaluateJob, predictions: &[Prediction], report: &Report) -> anyhow::Result<()> {
-    let Some(folder) = &job.figures else { return Ok(()) };
-    write_figures(folder, job.data.corpora(), predictions, &report.evaluation.reliability)?;
-    if !report.rivals.is_empty() {
-        let plot = plot_scene_means(predictions, &report.rivals)?;
+/// Draws how the model's predictions and those of rivals compare.
+pub(super) fn draw(folder: &Path, predictions: &[Prediction], rated: &[RatedRival]) -> anyhow::Result<()> {
+    if !rated.is_empty() {
+        let plot = plot_scene_means(predictions, rated)?;
         write_atomic(folder.join("rivals.svg"), |to| to.write_all(plot.as_bytes()))?;
     }
     Ok(())

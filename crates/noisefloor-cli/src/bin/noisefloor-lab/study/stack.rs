@@ -1,21 +1,30 @@
 //! `noisefloor-lab study stack`.
 
-use super::StackJob;
 use noisefloor::{Rgb, SourceInfo};
 use noisefloor_cli::end::Usage;
 use noisefloor_cli::folder::Folder;
 use noisefloor_cli::say::one_line;
 use noisefloor_cli::say::say;
 use noisefloor_cli::signals::cancel_on_signal;
-use noisefloor_cli::sources::{Opened, Source};
+use noisefloor_cli::sources::{Opened, Resources, Source, SourceJob};
 use noisefloor_denoise::{DenoisePasses, Denoiser, Guides, MirrorMean, NoisyPicture, Oidn};
 use noisefloor_image::LinearImage;
 use noisefloor_image::running_means;
 use noisefloor_sidecar::{FilterPlan, PictureCommand};
 use noisefloor_study::{StudyError, render_stack};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+
+pub struct StackJob {
+    pub source: SourceJob,
+    pub resources: Resources,
+    pub levels: Vec<u64>,
+    /// What all levels but the last pass through.
+    pub denoise: Option<StackDenoiser>,
+    pub out: PathBuf,
+}
 
 /// What the levels of a stack pass through.
 pub enum StackDenoiser {

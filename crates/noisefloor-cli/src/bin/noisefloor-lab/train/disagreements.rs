@@ -1,6 +1,7 @@
 //! Training on a table and on what people said against verdicts.
 
-use super::{TrainJob, say_model, say_scores};
+use super::say::{say_model, say_scores};
+use crate::learning::DataJob;
 use anyhow::bail;
 use noisefloor::{Model, People};
 use noisefloor_cli::bars::bar;
@@ -12,7 +13,8 @@ use std::path::Path;
 
 /// Trains, and says what the answers have changed.
 pub(super) fn run(
-    job: &TrainJob,
+    data: &DataJob,
+    out: &Path,
     table: &Table,
     params: &TrainParams,
     database: &Path,
@@ -41,10 +43,10 @@ pub(super) fn run(
         bar.set_message(step.doing);
     };
     let base = (&Model::bundled(), People::DEFAULT);
-    let (model, learned) = retrain(table, answers, params, base, &job.data.origin(), on_step)?;
+    let (model, learned) = retrain(table, answers, params, base, &data.origin(), on_step)?;
     bar.finish_and_clear();
-    write_atomic(&job.out, |to| model.write(to))?;
-    say_model(&model, &job.out)?;
+    write_atomic(out, |to| model.write(to))?;
+    say_model(&model, out)?;
     if let (Some(before), Some(after)) = (learned.before, learned.after) {
         say_scores("before ", before)?;
         say_scores("after  ", after)?;

@@ -1,6 +1,6 @@
 //! Denoised pictures made elsewhere.
 
-use super::{read, warn_of};
+use super::read::{read, warn_of};
 use anyhow::{Context, bail};
 use noisefloor::{
     Rgb, Tile, TileGrid, ToneMapping, Viewing,

@@ -1,6 +1,6 @@
 //! `tune --keep`: the picture of the last step, and what was found.
 
-use super::Row;
+use super::job::Row;
 use super::pictures::Judged;
 use crate::output::ERROR_SCALE;
 use anyhow::{Context, bail};

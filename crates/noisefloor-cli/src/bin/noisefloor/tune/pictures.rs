@@ -1,6 +1,6 @@
 //! Two pictures of a setting, and how far they are from what may be seen.
 
-use super::{TuneCriterion, TuneJob};
+use super::job::{TILE, TuneCriterion, TuneJob};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use noisefloor::source::SourceIdentity;
@@ -164,7 +164,7 @@ impl Pictures {
             return Ok(Self::Adaptive { source, most, seeds });
         }
         let info = source.info();
-        let film = Film::new(TileGrid::new(info.width, info.height, super::TILE)?);
+        let film = Film::new(TileGrid::new(info.width, info.height, TILE)?);
         Ok(Self::Samples { source, film })
     }
 
