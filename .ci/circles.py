@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Finds circles of imports: files of one crate that need each other. A module and its parts (`foo.rs` and what lies
-in `foo/`) are one story and may; other files that do are one story in two places, or two stories in one.
+"""Finds promised crates that stand on what is not promised, and circles of imports: files of one crate that need each
+other. A module and its parts (`foo.rs` and what lies in `foo/`) are one story and may; other files that do are one story
+in two places, or two stories in one.
 
 Reads the paths in `use` declarations and in code, by the rules of the 2018 edition: `crate::`, `super::`, `self::` and
 the names of modules. What a module hands on by `pub use` counts for the file that defines it. Tests are left out."""
@@ -9,6 +10,8 @@ import re
 import sys
 from pathlib import Path
 
+# Of these, docs/architecture.md promises that their interfaces change only with a version
+PROMISED = ["vision", "image", "denoise", "sidecar", "mitsuba", "luxcore", "cycles", "testkit"]
 PATH = re.compile(r"(?<![\w:])((?:crate|self|super|[a-z_][a-z0-9_]*)(?:::\w+)+)")
 USE = re.compile(r"\b(pub(?:\([^)]*\))?\s+)?use\s+([^;]+);")
 
@@ -96,6 +99,17 @@ def circles(edges):
     return sorted(sorted(group) for group in groups)
 
 
+def leaning():
+    """Crates that are promised and use hidden modules of the core, which any release may change, without saying which one."""
+    hidden = re.findall(r"#\[doc\(hidden\)\]\s*pub mod (\w+);", Path("crates/noisefloor/src/lib.rs").read_text())
+    for crate in (Path("crates/noisefloor-" + name) for name in PROMISED):
+        text = "".join(plain(file.read_text()) for file in crate.glob("src/**/*.rs"))
+        paths = [leaf for _, tree in USE.findall(text) for leaf in leaves(tree)] + PATH.findall(text)
+        used = {path for path in paths if path.split("::")[0] == "noisefloor" and path.split("::")[1] in hidden}
+        if used and 'noisefloor = { path = "../noisefloor", version = "=' not in (crate / "Cargo.toml").read_text():
+            yield crate.name, used
+
+
 def main():
     """Of every crate, or of the library or program whose root file is given."""
     roots = [Path(root) for root in sys.argv[1:]] or sorted(
@@ -110,6 +124,8 @@ def main():
             for module in group:
                 for other in sorted(edges[module] & set(group)):
                     print(f"    {'/'.join(module) or root.name} needs {'/'.join(other) or root.name}")
+    for crate, used in leaning():
+        sys.exit(f"{crate}: hidden parts of the core ({', '.join(sorted(used))}): promise them, or ask for one version, \"=…\"")
     if found:
         sys.exit("move what both need into a file of its own, or to the one that the other needs anyway")
 

@@ -7,7 +7,7 @@ use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard, set_last_warnings};
 use noisefloor::stills::StillError;
 use noisefloor::tune::{Ending, Excess, Knob, KnobError, Looked, Next, PairError, PicturePair, Tuning};
-use noisefloor::{Params, Rgb, internal::check_image};
+use noisefloor::{Params, Rgb, tile::check_image};
 use noisefloor_denoise::DenoisedError;
 use std::sync::{Mutex, PoisonError};
 

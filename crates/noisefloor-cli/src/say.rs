@@ -1,6 +1,6 @@
 //! What the command says: results on standard output, everything else on standard error.
 
-use noisefloor::internal::printable;
+use noisefloor::text::printable;
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt;

@@ -13,7 +13,7 @@ use exr::block::reader::ChunksReader;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use exr::prelude::f16;
-use noisefloor::internal::printable;
+use noisefloor::text::printable;
 use noisefloor::{Rgb, viewing::Chromaticities};
 use std::collections::HashSet;
 use std::path::Path;

@@ -5,7 +5,7 @@ use crate::open::{Format, Opened, guarded};
 use exr::meta::attribute::AttributeValue;
 use exr::meta::header::Header;
 use exr::prelude::Text;
-use noisefloor::{internal::printable, stills::SampleOrigin};
+use noisefloor::{stills::SampleOrigin, text::printable};
 use std::collections::HashMap;
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! Opening files that may be hostile: what the decoders share.
 
 use crate::error::PictureError;
-use noisefloor::internal::{check_image, stand_in};
 use noisefloor::viewing::Viewing;
+use noisefloor::{text::stand_in, tile::check_image};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};

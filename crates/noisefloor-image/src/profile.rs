@@ -2,7 +2,7 @@
 
 use crate::colours::{Curve, Stated, ToRec709};
 use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
-use noisefloor::internal::printable;
+use noisefloor::text::printable;
 
 /// A profile of three primaries and their curves, or of a grey.
 pub(crate) fn stated(profile: &[u8]) -> Result<Stated, String> {

@@ -7,7 +7,7 @@ use crate::plane::{Channel, Channels, Plane};
 use exr::prelude::{
     Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder, Text, WritableImage,
 };
-use noisefloor::{Rgb, internal::check_image};
+use noisefloor::{Rgb, tile::check_image};
 use std::io::Write;
 use std::path::Path;
 

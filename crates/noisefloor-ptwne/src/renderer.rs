@@ -122,7 +122,7 @@ impl Ptwne {
         height: usize,
         options: RenderOptions,
     ) -> Result<Self, RenderError> {
-        noisefloor::internal::check_image(width, height)?;
+        noisefloor::tile::check_image(width, height)?;
         let bad = |name, value, range| Err(RenderError::Option { name, value, range });
         if !(1..=MAX_DEPTH).contains(&options.max_depth) {
             return bad("max_depth", options.max_depth as usize, "1…10000 segments");

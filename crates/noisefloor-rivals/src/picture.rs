@@ -1,6 +1,6 @@
 //! Pictures in, maps of differences out.
 
-use noisefloor::{Rgb, internal::check_image, tile::TileError};
+use noisefloor::{Rgb, tile::TileError, tile::check_image};
 use noisefloor_vision::VisionError;
 use std::ops::RangeInclusive;
 use thiserror::Error;

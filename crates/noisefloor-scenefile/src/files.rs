@@ -1,9 +1,9 @@
 //! Files that a scene file names, how much of them is read, and what was in them.
 
 use crate::error::{LoadError, Place};
-use noisefloor::internal::stand_in;
-pub(crate) use noisefloor::internal::{lines, text};
 use noisefloor::source::SourceIdentity;
+use noisefloor::text::stand_in;
+pub(crate) use noisefloor::text::{lines, text};
 use noisefloor_ptwne::check_memory;
 use std::cell::{Cell, RefCell};
 use std::collections::HashSet;

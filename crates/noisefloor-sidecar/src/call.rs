@@ -3,10 +3,7 @@
 use crate::error::SidecarCause;
 use crate::message::{Hello, Sampled, Status};
 use crate::process::{Failure, Process};
-use noisefloor::{
-    Batch, Counts, Request, Rgb, SourceInfo,
-    internal::{check_image, printable},
-};
+use noisefloor::{Batch, Counts, Request, Rgb, SourceInfo, text::printable, tile::check_image};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 

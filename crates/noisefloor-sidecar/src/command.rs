@@ -6,10 +6,8 @@ use crate::picture_run::PictureRun;
 use crate::renderer::DEFAULT_TIMEOUT;
 use crate::template::Template;
 use noisefloor::{
-    Batch, ProgressiveSource, Request, SourceError, SourceInfo, Tile,
-    internal::{check_image, printable},
-    source::SourceIdentity,
-    watch::LightCheck,
+    Batch, ProgressiveSource, Request, SourceError, SourceInfo, Tile, source::SourceIdentity,
+    text::printable, tile::check_image, watch::LightCheck,
 };
 use noisefloor_image::LinearImage;
 use std::ffi::OsString;

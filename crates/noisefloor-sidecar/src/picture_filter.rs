@@ -6,7 +6,7 @@ use crate::message::{FilterHello, Filtered, Filtering, InitFilter, PROTOCOL};
 use crate::process::Process;
 use crate::renderer::{DEFAULT_TIMEOUT, Device, Renderer};
 use crate::setup;
-use noisefloor::{Rgb, internal::printable, tile::MAX_PIXELS};
+use noisefloor::{Rgb, text::printable, tile::MAX_PIXELS};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -3,7 +3,7 @@
 use crate::error::CommandError;
 use crate::group::Group;
 use crate::scratch::Scratch;
-use noisefloor::internal::printable;
+use noisefloor::text::printable;
 use noisefloor_image::{LinearImage, Picture, read_picture};
 use std::ffi::OsString;
 use std::fs::File;

@@ -2,7 +2,7 @@
 
 use crate::frame::{self, Frame, FrameError};
 use crate::group::Group;
-use noisefloor::internal::printable;
+use noisefloor::text::printable;
 use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::{self, BufReader, Read};

@@ -1,6 +1,6 @@
 //! Short runs of a program for its output.
 
-use noisefloor::internal::printable;
+use noisefloor::text::printable;
 use std::io::{self, BufRead, BufReader, Read};
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};

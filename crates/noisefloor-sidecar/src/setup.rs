@@ -4,7 +4,7 @@ use crate::error::SetupError;
 use crate::renderer::Renderer;
 use crate::run::run;
 use etcetera::BaseStrategy;
-use noisefloor::internal::printable;
+use noisefloor::text::printable;
 use serde::Deserialize;
 use std::collections::VecDeque;
 use std::fs::{self, File};

@@ -350,7 +350,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     ///
     /// # Errors
     /// As of [`Background::into_session`], and the second time.
-    #[cfg(feature = "internals")]
+    #[doc(hidden)]
     pub fn take_session(&self) -> Result<Session<C>, SessionError> {
         self.take()
     }

@@ -9,6 +9,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use thiserror::Error;
 
+#[cfg(feature = "files")]
 pub(crate) mod planes;
 
 /// Samples per pixel that no half of a tile has: sums over the largest picture, of 2²⁸ pixels, stay within 64 bits.
@@ -202,6 +203,16 @@ pub struct Film {
 }
 
 impl Film {
+    /// Checks that there is memory for a film with so many halves: without it, making one ends the process.
+    pub(crate) fn check_memory(grid: TileGrid, halves: usize) -> Result<(), FilmError> {
+        // Three f32 and three i16 in a half
+        const PIXEL: usize = 18;
+        let (width, height) = grid.size();
+        let bytes = halves * PIXEL * width * height;
+        let there = Vec::<u8>::new().try_reserve_exact(bytes);
+        there.map_err(|_| FilmError::Memory { width, height, bytes })
+    }
+
     /// An empty film that keeps two halves.
     pub fn new(grid: TileGrid) -> Self {
         Self::with_halves(grid, 2)
@@ -419,6 +430,7 @@ impl Film {
     }
 
     /// Validates a film that was read, against an empty one of the same job.
+    #[cfg(feature = "files")]
     pub(crate) fn check_like(&self, fresh: &Self) -> Result<(), &'static str> {
         if self.grid != fresh.grid || self.halves.len() != fresh.halves.len() {
             return Err("its film is not of this job");

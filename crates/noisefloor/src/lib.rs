@@ -19,7 +19,8 @@
 //! - `files` (on by default): model files, checkpoints, and serde's traits on what they hold. Without it,
 //!   the library needs neither serde nor bincode nor BLAKE3.
 //!
-//! Two more, `internals` and `train`, serve the crates that train models; any release may change what they open.
+//! One more, `train`, serves the crates that train models. What is hidden from these pages serves the crates of this
+//! repository, too; any release may change it.
 //!
 //! # Threads
 //! [`Session::judge`] and [`Session::push_image`] use all threads of the rayon pool that they are called in: the global one,
@@ -44,27 +45,20 @@
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```
 
-// What only files, training and tests use stands beside what it belongs to
-#![cfg_attr(not(feature = "internals"), allow(dead_code, unreachable_pub, unused_imports))]
-
 pub mod background;
 #[cfg(feature = "files")]
 pub mod checkpoint;
 #[cfg(feature = "files")]
 mod container;
 pub mod criterion;
-#[cfg(not(feature = "internals"))]
-mod descriptor;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod descriptor;
 pub mod display;
 pub mod driver;
-#[cfg(not(feature = "internals"))]
-mod evidence;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod evidence;
 pub mod film;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod internal;
 pub mod model;
 mod nested;
@@ -76,16 +70,12 @@ mod rgb;
 pub mod session;
 pub mod source;
 pub mod stills;
-#[cfg(not(feature = "internals"))]
-mod svm;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod svm;
-mod text;
+pub mod text;
 pub mod tile;
 pub mod tune;
-#[cfg(not(feature = "internals"))]
-mod unmet;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod unmet;
 pub mod watch;
 

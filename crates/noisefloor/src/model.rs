@@ -5,7 +5,6 @@ use crate::container::MAX_PAYLOAD;
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
 use crate::params::Audience;
-#[cfg(feature = "internals")]
 use crate::{descriptor::Descriptor, people::Spread, svm::Classifier};
 use noisefloor_vision::Viewing;
 #[cfg(feature = "files")]
@@ -20,14 +19,10 @@ mod file;
 mod parts;
 
 pub use crate::descriptor::DescriptorError;
-#[cfg(not(feature = "internals"))]
-pub(crate) use familiarity::Familiarity;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub use familiarity::Familiarity;
 pub(crate) use parts::ProbabilityCurve;
-#[cfg(not(feature = "internals"))]
-pub(crate) use parts::{Judgement, ModelParts, Scores, TrainingRecord};
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub use parts::{Judgement, ModelParts, Scores, TrainingRecord};
 
 /// The version of files that is written, and the only one that is read.
@@ -142,7 +137,7 @@ impl Model {
 }
 
 /// What models are made of.
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 impl Model {
     /// A model made of these parts.
     ///

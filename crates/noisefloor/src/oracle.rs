@@ -14,9 +14,7 @@ use rayon::prelude::*;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
-#[cfg(not(feature = "internals"))]
-pub(crate) use crate::people::Spread;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub use crate::people::Spread;
 pub use crate::people::{People, PeopleError};
 
@@ -444,7 +442,7 @@ impl Oracle {
 }
 
 /// What describes tiles one by one, for whoever has the parts that verdicts are made of.
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 impl Oracle {
     /// Describes one tile of a picture by its planes, which have `spp` samples per pixel, above 0.
     /// [`Oracle::judge_described`] wants all tiles of the picture.

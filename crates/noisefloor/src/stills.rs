@@ -21,15 +21,8 @@ use thiserror::Error;
 
 mod notice;
 mod origin;
-pub use notice::Noticed;
 pub use origin::{OriginRelation, SampleOrigin};
 
-/// Edge of the blocks in which pictures are compared for [`StillWarning`], in pixels.
-const BLOCK: usize = 8;
-/// Standard errors that chance does not reach, and the correlation worth a warning: those of
-/// [`crate::watch`].
-const CERTAIN: f64 = 6.5;
-const NOTABLE: f64 = 0.1;
 /// Pixels that a thread looks at.
 const AT_ONCE: usize = 1 << 16;
 
@@ -194,6 +187,18 @@ pub enum StillWarning {
          compare linear radiance, not what is shown on a screen"
     )]
     Clipped(f64),
+}
+
+/// What two pictures say against a verdict on them.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Noticed {
+    /// What is likely wrong with them.
+    pub warnings: Vec<StillWarning>,
+    /// For each tile, whether its brightness differs between the two by more than their noise explains: by a tenth of
+    /// the display's range on average, and three times the standard deviation from pixel to pixel. Renderings of one
+    /// view have no such tiles, and a verdict on one means nothing.
+    pub unlike: Vec<bool>,
 }
 
 impl Still {
@@ -432,7 +437,7 @@ impl<'a> SnapshotPair<'a> {
     /// # Errors
     /// [`StillError::Nested`] if nested pictures have as many samples, [`StillError::Tile`] if the tile does not
     /// lie in them.
-    #[cfg(feature = "internals")]
+    #[doc(hidden)]
     pub fn planes(&self, tile: Tile) -> Result<TilePlanes, StillError> {
         self.planes_of(tile)
     }
@@ -475,7 +480,7 @@ impl<'a> SnapshotPair<'a> {
     ///
     /// # Errors
     /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.
-    #[cfg(feature = "internals")]
+    #[doc(hidden)]
     pub fn describe(&self, oracle: &Oracle, grid: TileGrid) -> Result<Vec<Described>, StillError> {
         self.describe_tiles(oracle, grid)
     }

@@ -20,7 +20,7 @@ pub const MAX_PIXELS: usize = 1 << 28;
 ///
 /// # Errors
 /// [`TileError::Image`] if it is empty or too large.
-pub(crate) fn check_image(width: usize, height: usize) -> Result<(), TileError> {
+pub fn check_image(width: usize, height: usize) -> Result<(), TileError> {
     let fits = (1..=MAX_EDGE).contains(&width) && (1..=MAX_EDGE).contains(&height);
     if fits && width * height <= MAX_PIXELS { Ok(()) } else { Err(TileError::Image(width, height)) }
 }

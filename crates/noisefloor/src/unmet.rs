@@ -134,6 +134,7 @@ impl MetOnce {
         (self.density() - own.density()).max(0.0) / (1.0 + finds)
     }
 
+    #[cfg(feature = "files")]
     pub(crate) fn is_sound(self) -> bool {
         let Self { light, by_sample, pixels } = self;
         [light, by_sample, pixels].into_iter().all(|v| v.is_finite() && v >= 0.0)

@@ -150,6 +150,7 @@ impl Watch {
 
     /// Goes on with what a checkpoint holds, which has to be of a picture like this one; false if it is not.
     /// Pixels share samples if either says so.
+    #[cfg(feature = "files")]
     pub(crate) fn restore(&mut self, kept: Self) -> bool {
         let points = self.points();
         let fits = |(tile, watch): (Tile, &TileWatch)| {

@@ -28,7 +28,7 @@ use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{delete, get, post, put};
 use gallery::Gallery;
-use noisefloor::internal::told_apart;
+use noisefloor::text::told_apart;
 use noisefloor_pages::http::{self, Exposure, Guard, Listening};
 use std::future::Future;
 use std::net::SocketAddr;

@@ -19,7 +19,7 @@ pub fn rival(text: &str) -> Result<&'static Rival, String> {
 pub fn size(text: &str) -> Result<(usize, usize), String> {
     let parts = text.split_once(['x', 'X', '×']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     let (width, height) = parts.ok_or("expected WIDTHxHEIGHT in pixels, such as 512x512")?;
-    noisefloor::internal::check_image(width, height).map_err(|e| e.to_string())?;
+    noisefloor::tile::check_image(width, height).map_err(|e| e.to_string())?;
     Ok((width, height))
 }
 

@@ -1,7 +1,7 @@
 //! Asking a source for samples, and checking the shape of each answer.
 
 use noisefloor::{
-    Batch, Counts, ProgressiveSource, Repeats, Request, SourceInfo, Tile, TileGrid, internal::check_image,
+    Batch, Counts, ProgressiveSource, Repeats, Request, SourceInfo, Tile, TileGrid, tile::check_image,
 };
 
 /// Tile edge that sources are asked in: an image of 48×40 pixels has a narrower tile to the right, and both

@@ -1,20 +1,16 @@
 //! A film in a file: what it knows of its tiles, and then its pixels, which memory need not hold twice.
 
-use super::{Film, FilmError, Half};
+use super::{Film, Half};
 use crate::rgb::Rgb;
 use crate::tile::TileGrid;
-#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 
-/// Bytes of a pixel of one half: three f32 and three i16.
-const PIXEL: usize = 18;
 /// Pixels that room is made for at once.
 const STEP: usize = 1 << 20;
 
 /// All but the pixels.
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct FilmHead {
     grid: TileGrid,
     /// For each half that is kept, whether rejected samples are counted by pixel.
@@ -31,14 +27,6 @@ impl FilmHead {
 }
 
 impl Film {
-    /// Checks that there is memory for a film with so many halves: without it, making one ends the process.
-    pub(crate) fn check_memory(grid: TileGrid, halves: usize) -> Result<(), FilmError> {
-        let (width, height) = grid.size();
-        let bytes = halves * PIXEL * width * height;
-        let there = Vec::<u8>::new().try_reserve_exact(bytes);
-        there.map_err(|_| FilmError::Memory { width, height, bytes })
-    }
-
     pub(crate) fn head(&self) -> FilmHead {
         let halves = self.halves.iter().map(|half| !half.rejected.is_empty()).collect();
         FilmHead { grid: self.grid, halves, counts: self.counts.clone(), rejected: self.rejected }

@@ -90,7 +90,7 @@ impl Model {
     ///
     /// # Errors
     /// [`ModelError`] as in [`Model::read`].
-    #[cfg(feature = "internals")]
+    #[doc(hidden)]
     pub fn read_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Self, ModelError> {
         Self::read_kinds(from, kinds)
     }

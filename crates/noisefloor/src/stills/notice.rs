@@ -1,28 +1,22 @@
 //! What is noticed of two pictures, wherever two pictures are compared.
 
-use super::{BLOCK, CERTAIN, NOTABLE, SnapshotPair, Still, StillError, StillWarning};
+use super::{Noticed, SnapshotPair, Still, StillError, StillWarning};
 use crate::display::{Display, luminance};
 use crate::tile::{Tile, TileGrid};
 use crate::watch::{ImpossibleLight, PictureValues, check_picture};
 use rayon::prelude::*;
 
+/// Edge of the blocks in which pictures are compared for [`StillWarning`], in pixels.
+const BLOCK: usize = 8;
+/// Standard errors that chance does not reach, and the correlation worth a warning: those of
+/// [`crate::watch`].
+const CERTAIN: f64 = 6.5;
+const NOTABLE: f64 = 0.1;
 /// Mean difference of a tile from which it may be unlike, as a share of the display's range.
 const UNLIKE: f64 = 0.1;
 /// Ratio of brightness worth a warning. Where one picture has few samples, most of its blocks are darker than
 /// the mean, since few pixels have found what light is seldom found.
 const BRIGHTER: f64 = 1.25;
-
-/// What two pictures say against a verdict on them.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Noticed {
-    /// What is likely wrong with them.
-    pub warnings: Vec<StillWarning>,
-    /// For each tile, whether its brightness differs between the two by more than their noise explains: by a tenth of
-    /// the display's range on average, and three times the standard deviation from pixel to pixel. Renderings of one
-    /// view have no such tiles, and a verdict on one means nothing.
-    pub unlike: Vec<bool>,
-}
 
 impl SnapshotPair<'_> {
     /// What the whole pictures say against a verdict on them. Whoever judges two pictures asks first.

@@ -62,6 +62,7 @@ pub(super) struct TileWatch {
 impl TileWatch {
     /// Whether what was read can be what was written of a tile, which has so many watched pixels at first and
     /// later.
+    #[cfg(feature = "files")]
     pub(super) fn fits(&self, at_first: usize, later: usize) -> bool {
         let points = if self.batches <= 4 { at_first } else { later };
         self.group.len() < 4 && self.group.iter().all(|seen| seen.spp > 0 && seen.light.len() == points)

@@ -126,7 +126,7 @@ fn parse(
     if row.x > MAX_EDGE || row.y > MAX_EDGE {
         return Err(format!("x and y must be 0…{MAX_EDGE} pixels, not {} and {}", row.x, row.y));
     }
-    noisefloor::internal::check_image(row.width, row.height).map_err(|e| e.to_string())?;
+    noisefloor::tile::check_image(row.width, row.height).map_err(|e| e.to_string())?;
     if !row.human_spp.is_finite() || row.human_spp <= 0.0 {
         return Err(format!("human_spp must be positive, not {}", row.human_spp));
     }

@@ -2,7 +2,7 @@
 
 use crate::bars::Bars;
 use anyhow::Context;
-use noisefloor::internal::told_apart;
+use noisefloor::text::told_apart;
 use noisefloor::{Params, SourceInfo, StoppingCriterion};
 use noisefloor_cli::end::Usage;
 use noisefloor_cli::files::read_reference;
