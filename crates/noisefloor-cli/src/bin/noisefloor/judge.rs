@@ -96,8 +96,8 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
         error => error.into(),
     })?;
     let rows = rows(grid, image.spp, &judged, &unlike);
-    report::say_all((&job.image.0, image.spp), &job.oracle, &rows, job.json)?;
-    draw(job, &image, grid, (&held, &judged), &rows)
+    report::say_all(&job.image.0, image.spp, &job.oracle, &rows, job.json)?;
+    draw(job, &image, grid, &held, &judged, &rows)
 }
 
 /// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.
@@ -134,7 +134,8 @@ fn draw(
     job: &JudgeJob,
     image: &Still,
     grid: TileGrid,
-    (held, judged): (&SnapshotPair<'_>, &JudgedTiles),
+    held: &SnapshotPair<'_>,
+    judged: &JudgedTiles,
     rows: &[Row],
 ) -> anyhow::Result<()> {
     let width = grid.width();

@@ -220,7 +220,7 @@ impl Output {
         if let Some(checkpoint) = checkpoint.filter(|_| under_way || self.keeps_finished) {
             write_atomic(self.path(if done { FINISHED } else { CHECKPOINT }), |to| checkpoint.write(to))?;
         }
-        write_json(&self.path(REPORT), &Report::new(self, session, &tiles, (job.as_deref(), over)))?;
+        write_json(&self.path(REPORT), &Report::new(self, session, &tiles, job.as_deref(), over))?;
         if under_way { Ok(()) } else { remove(&self.path(CHECKPOINT)) }
     }
 

@@ -89,7 +89,7 @@ impl Prepared {
             (CriterionJob::Denoised { lost, passes, device }, None) => {
                 let plan = filter_plan(device.as_deref(), resources.timeout)?;
                 let rays = job.source.first_hits_spp();
-                let (criterion, denoised) = denoised::begin(&mut source, rays, (*lost, *passes), plan)?;
+                let (criterion, denoised) = denoised::begin(&mut source, rays, *lost, *passes, plan)?;
                 (criterion, Some(denoised))
             }
             (_, None) => bail!("no model was read"),

@@ -41,7 +41,8 @@ struct Report<'a> {
 
 /// Says what the verdicts are on a picture with that many samples per pixel.
 pub(super) fn say_all(
-    (image, spp): (&Path, f64),
+    image: &Path,
+    spp: f64,
     oracle: &Oracle,
     rows: &[Row],
     json: bool,

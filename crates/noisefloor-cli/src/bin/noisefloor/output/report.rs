@@ -82,7 +82,8 @@ impl<'a> Report<'a> {
         output: &'a Output,
         session: &'a Session,
         tiles: &[TileState],
-        (job, over): (Option<&'a str>, Option<Over<'_>>),
+        job: Option<&'a str>,
+        over: Option<Over<'_>>,
     ) -> Self {
         let (clock, source) = over.unzip();
         let source = source.flatten();

@@ -21,7 +21,8 @@ const WORTH_SAYING: f64 = 2.0;
 pub(super) fn begin(
     source: &mut impl ProgressiveSource,
     rays: u64,
-    (lost, passes): (f64, DenoisePasses),
+    lost: f64,
+    passes: DenoisePasses,
     plan: FilterPlan,
 ) -> anyhow::Result<(Box<dyn StoppingCriterion + Send>, Denoised)> {
     let (mut denoiser, give_up) = (Oidn::start(plan)?, Arc::<AtomicBool>::default());
