@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the study of docs/spread.md, ready to serve: spread.sh FOLDER [noisy|denoised]. Renders its pictures with
+# Makes the study of docs/studies.md, ready to serve: spread.sh FOLDER [noisy|denoised]. Renders its pictures with
 # noisefloor's own renderer: some ten minutes of one core for each of the four scenes, and denoises them with Open Image
 # Denoise (`noisefloor doctor --install oidn`) if the second word says so. What is there already is kept.
 set -euo pipefail

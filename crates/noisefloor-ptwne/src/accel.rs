@@ -1,5 +1,4 @@
 //! Ray intersection: a bounding volume hierarchy, traversed eight boxes and four surfaces at a time.
-//! `docs/benchmarks/bvh.md` says why.
 //!
 //! [`shape`] is what goes in, [`leaf`] and [`node`] are what a ray is tested against, [`tree`] is a hierarchy of
 //! boxes, and [`cut`] how it is built. [`bvh`] is one over surfaces, [`build`] makes it and [`traverse`] walks it. [`hierarchy`] is a scene's:
@@ -16,8 +15,6 @@ mod shape;
 mod traverse;
 mod tree;
 
-#[cfg(test)]
-mod speed;
 #[cfg(test)]
 mod tests;
 

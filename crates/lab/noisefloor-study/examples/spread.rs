@@ -1,4 +1,4 @@
-//! How many people and tiles it takes to measure how far people lie from each other: prints the table in docs/spread.md.
+//! How many people and tiles it takes to measure how far people lie from each other: prints the table in docs/studies.md.
 //! Takes minutes.
 //!
 //! ```sh
@@ -7,13 +7,29 @@
 
 #![allow(clippy::print_stdout, clippy::expect_used, reason = "prints a table")]
 
-mod kit;
-
-use kit::study_of;
+use noisefloor_image::write_png;
 use noisefloor_study::analysis::{Observer, PeopleSpread, spreads};
 use noisefloor_study::simulated::{Public, SpreadShape, run};
 use noisefloor_study::{ParticipantSession, Plan, Study, grids};
 use std::sync::Arc;
+use tempfile::TempDir;
+
+/// A study of one stack with this many tiles. The pictures are grey: simulated observers do not look at them.
+fn study_of(levels: &[u64], tiles: usize) -> (TempDir, Arc<Study>) {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let stack = dir.path().join("wall");
+    std::fs::create_dir(&stack).expect("a folder for the stack");
+    for spp in levels {
+        let grey = vec![128; 3 * 16 * tiles * 16];
+        write_png(stack.join(format!("{spp:05}.png")), 16 * tiles, 16, &grey).expect("a picture");
+    }
+    let text = "protocol = \"acquisition\"\ndatabase = \"answers.sqlite\"\ntile = 16\n\
+                [text.en]\ntitle = \"Walls\"\nconsent = \"I take part.\"\n\
+                [[stack]]\nname = \"wall\"\nfolder = \"wall\"\n";
+    let file = dir.path().join("study.toml");
+    std::fs::write(&file, text).expect("a study file");
+    (dir, Arc::new(Study::open(file).expect("a valid study")))
+}
 
 /// Those of `study stack`.
 fn levels() -> Vec<u64> {
@@ -34,14 +50,14 @@ fn observers(study: &Arc<Study>, public: &Public, count: u64, seed: u64) -> Vec<
 fn main() {
     let studies: u64 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(200);
     println!(
-        "| spread | people | tiles | found: mean, scatter | within ±0.05 | intervals that hold it, median half-width |"
+        "| spread; people, tiles | found: mean, scatter | within ±0.05 | intervals that hold it; median half-width |"
     );
-    println!("|---|---|---|---|---|---|");
+    println!("|---|---|---|---|");
     for (shape, truth) in
         [0.3, 0.5, 0.7].map(|t| (SpreadShape::Logistic, t)).into_iter().chain([(SpreadShape::Lognormal, 0.5)])
     {
         for (people, tiles) in [(10, 12), (10, 24), (20, 24), (40, 24), (80, 24)] {
-            let (_dir, study) = study_of("acquisition", &levels(), tiles, "");
+            let (_dir, study) = study_of(&levels(), tiles);
             let thresholds = vec![(0..tiles).map(|t| 90.0 * 2f64.powf(t as f64 / tiles as f64)).collect()];
             let public = Public { thresholds, shape, ..Public::made_up(&study).spread_by(truth) };
             let found: Vec<PeopleSpread> = (0..studies)
@@ -62,7 +78,7 @@ fn main() {
                 found.iter().filter_map(|s| s.interval.map(|[low, high]| 0.5 * (high - low))).collect();
             widths.sort_by(f64::total_cmp);
             println!(
-                "| {truth} ({shape:?}) | {people} | {tiles} | {mean:.2}, {scatter:.2} | {near:.0} % | {held:.0} %, ±{:.2} |",
+                "| {truth} ({shape:?}); {people}, {tiles} | {mean:.2}, {scatter:.2} | {near:.0} % | {held:.0} %; ±{:.2} |",
                 widths[widths.len() / 2]
             );
         }

@@ -3,7 +3,7 @@
 //! With thirty observers nobody sees the shape of the spread, but the 95 % level depends on it. The posterior
 //! is therefore taken over median, width and shape (`shapes`) and a share of slips, on a grid;
 //! estimates are posterior medians, intervals hold 95 % of the posterior. How often they hold the truth is
-//! simulated in `examples/coverage.rs`.
+//! tested in `tests/it/coverage.rs`.
 
 use super::shapes::{SHAPES, Shape};
 use noisefloor_pages::questplus::Posterior;
