@@ -7,8 +7,7 @@
 Pages stay where a forge shows them: beside the code that they describe. So they are copied into target/book/src,
 together with all files that they link to, and mdBook runs there. Links are checked twice: in the pages, against the
 files of the repository and the anchors that a forge makes of headings; and in the book, against the files and anchors
-that mdBook made. Links to other sites are not followed. The places in the code that docs/paper.md names are checked, and the tests that
-docs/numerics.md names.
+that mdBook made. Links to other sites are not followed. The places in the code that docs/paper.md names are checked.
 """
 
 import argparse
@@ -99,15 +98,6 @@ def check_places(page):
     return faults
 
 
-def check_tests(page):
-    """What is wrong with the tests that a page names in the last column of its tables."""
-    rust = "".join((ROOT / file).read_text() for file in tracked() if file.endswith(".rs"))
-    known = set(re.findall(r"\bfn (\w+)", rust))
-    cells = [line.rsplit("|", 2)[1] for line in (ROOT / page).read_text().splitlines() if line.startswith("|")]
-    named = [name for cell in cells for name in re.findall(r"`([a-z0-9_]+)`", cell)]
-    return [f"{page}: there is no test {name}" for name in named if name not in known]
-
-
 def stage(pages, linked):
     """Copies pages and what they link to. mdBook makes index.html of README.md, but leaves links to it alone."""
     shutil.rmtree(BOOK, ignore_errors=True)
@@ -167,7 +157,7 @@ if __name__ == "__main__":
     args = parser.parse_args()
     pages = [file for file in tracked() if file.endswith(".md")]
     faults, linked = check_pages(pages)
-    faults += check_places("docs/paper.md") + check_tests("docs/numerics.md")
+    faults += check_places("docs/paper.md")
     if not args.check:
         stage(pages, linked)
         subprocess.run([args.mdbook, "build", BOOK], check=True)

@@ -32,7 +32,7 @@ const DENOISED_DECAY: f64 = 0.38;
 /// Light that few samples have met is spread over ever more finds.
 const UNMET_DECAY: f64 = 1.0;
 /// A tile that needs n samples takes n^TOGETHER · N^(1 − TOGETHER), where the hardest so far needs N, if these are so many
-/// times more than it has (`docs/benchmarks/where.md`).
+/// times more than it has (`docs/benchmarks/denoised.md`).
 const TOGETHER: f64 = 0.72;
 const TOGETHER_STEP: f64 = 1.2;
 /// From so many tiles on, counts that are drawn together make up for most of what estimates err by, and this is left of the
@@ -40,7 +40,7 @@ const TOGETHER_STEP: f64 = 1.2;
 const COMPANY: usize = 16;
 const ERR_BY_IN_COMPANY: f64 = 1.1;
 /// JODs that a tile may lose, unless one says otherwise. Where people stopped seeing *noise*, zones had lost as much,
-/// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/criteria.md`).
+/// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/stops.md`).
 pub const DEFAULT_JODS_LOST: f64 = 0.3;
 /// Edge of the square that a smaller tile is judged in, in pixels: as [`noisefloor::tune::squares`].
 const SQUARE: usize = 64;
@@ -54,13 +54,13 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 /// The two halves of the film are denoised apart, whole, and [`DenoisedError`] says how wrong the denoised
 /// picture is; the vision model says how many just-objectionable differences (JOD) each tile has lost by that. A tile with
 /// a side of less than 64 pixels is also done when the square of 64 pixels around it is: the smaller the tiles, the
-/// fewer samples go to where nothing asks for them (`docs/benchmarks/tiles.md`).
+/// fewer samples go to where nothing asks for them (`docs/benchmarks/stops.md`).
 ///
 /// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
 /// they are given. [`Verdict::undenoised`] says so, and [`compose`](crate::compose) shows such tiles as they were rendered.
 ///
 /// Counts are drawn together: a tile that is satisfied goes on being sampled, a little, and is judged again, while others need
-/// far more. For the same promise, this takes about as many samples, and leaves less in the mean (`docs/benchmarks/where.md`).
+/// far more. For the same promise, this takes about as many samples, and leaves less in the mean (`docs/benchmarks/denoised.md`).
 ///
 /// A tile stays open as long as it is likely to lack light that few samples have met ([`Verdict::unmet`]), and that would by itself
 /// lose more than the limit where it fell on a plain field as bright as the tile: a denoiser takes lone finds for noise, and removes

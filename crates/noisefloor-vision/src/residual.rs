@@ -50,7 +50,7 @@ pub struct ResidualPatch<'a> {
     pub rows: Range<usize>,
 }
 
-/// How much of the model is computed for a residual: less is faster. `docs/benchmarks/vision.md` has a table.
+/// How much of the model is computed for a residual: less is faster. `docs/benchmarks/cost.md` has a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisionDetail {
     /// Whether the chromatic channels are computed.

@@ -7,7 +7,7 @@
 //! in every frame passes the sustained channels as it is (Σ hₖ = 1), and not the transient one (Σ hₖ = 3·10⁻⁷).
 //! So one frame, with its noise times a gain for each channel, stands for the film. The mean of a heavy tail over
 //! frames is nearer to a normal distribution than its values are, which this leaves out:
-//! `docs/benchmarks/film.md` has what it amounts to.
+//! `docs/benchmarks/films.md` has what it amounts to.
 
 use crate::photometry::CHANNELS;
 

@@ -25,7 +25,7 @@
 //! # Threads
 //! [`Session::judge`] and [`Session::push_image`] use all threads of the rayon pool that they are called in: the global one,
 //! or your own by `pool.install(|| session.judge())`. Results do not depend on their number. A verdict on a tile of 128×128
-//! pixels takes 0.4 ms of one processor (`docs/benchmarks/oracle.md` of the project); a
+//! pixels takes 0.4 ms of one processor (`docs/benchmarks/cost.md` of the project); a
 //! [`Background`](background::Background) session judges in a thread of its own.
 //!
 //! ```

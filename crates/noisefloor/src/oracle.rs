@@ -27,7 +27,7 @@ const TRUSTED_SPP: u64 = 100;
 
 /// Samples of a picture from which it is trusted sooner: in fewer, light that makes up a tenth of a picture is
 /// too often met by none. Pictures from 362×362 pixels on have them at the first verdict
-/// (docs/benchmarks/unmet.md).
+/// (docs/benchmarks/stops.md).
 const TRUSTED_SAMPLES: u64 = 1 << 21;
 
 /// Share of the pixels of a tile that have to carry its noise for it to be trusted sooner.

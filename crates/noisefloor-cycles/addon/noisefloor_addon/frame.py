@@ -27,7 +27,7 @@ CELL = 32
 AIM, LEAST_STEP = 0.9, 1.25
 # Fewer samples are not worth a call of Cycles, which looks at its threshold after 16
 FEWEST = 16
-# What a call costs a GPU, however small the part, in samples of each pixel of the frame: 36 and 40 on an H200 (docs/benchmarks/gpu.md)
+# What a call costs a GPU, however small the part, in samples of each pixel of the frame: 36 and 40 on an H200 (docs/benchmarks/cost.md)
 START = 32
 
 

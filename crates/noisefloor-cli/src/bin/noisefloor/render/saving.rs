@@ -9,7 +9,7 @@ const LEAST: Duration = Duration::from_secs(30);
 /// before it took.
 const PAUSES: u32 = 99;
 /// Nanoseconds that a pixel of a checkpoint and of all pictures take, until it is measured
-/// (docs/benchmarks/large.md).
+/// (docs/benchmarks/cost.md).
 const CHECKPOINT: u64 = 80;
 const PICTURES: u64 = 600;
 
