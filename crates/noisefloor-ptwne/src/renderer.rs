@@ -351,6 +351,7 @@ impl ProgressiveSource for Ptwne {
     fn info(&self) -> SourceInfo {
         SourceInfo::new(format!("ptwne {}", self.scene.name()), self.width, self.height)
             .with_repeats(Repeats::Samples)
+            .with_stratified(self.options.sampling == Sampling::Sobol)
     }
 
     /// Never fails.

@@ -189,6 +189,9 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         let mut session = Session::new(info.width, info.height, criterion, params)?;
         session.set_source(source.identity()?);
         session.set_pixels(info.pixels);
+        if info.stratified {
+            session.set_stratified();
+        }
         session.set_linear();
         let cancel = Arc::new(AtomicBool::new(false));
         let (timeline, clock) = (Vec::new(), Clock::default());

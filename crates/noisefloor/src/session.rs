@@ -227,6 +227,11 @@ impl<C: StoppingCriterion> Session<C> {
         self.watch.set_linear();
     }
 
+    /// Says that the samples of each sequence complete each other ([`SourceInfo::stratified`](crate::SourceInfo)).
+    pub(crate) fn set_stratified(&mut self) {
+        self.watch.set_sequences(Some(if self.film.has_halves() { 2 } else { 1 }));
+    }
+
     /// Provides the quick noise-free reference, for criteria that need one.
     ///
     /// # Errors

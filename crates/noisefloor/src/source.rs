@@ -97,6 +97,9 @@ pub struct SourceInfo {
     pub counts: Counts,
     /// Whether the noise of pixels is independent.
     pub pixels: PixelNoise,
+    /// Whether the samples of a batch complete each other, as quasi-random points do. Their noise depends on where in its
+    /// sequence a batch lies, and need not fall as independent samples' does.
+    pub stratified: bool,
 }
 
 impl SourceInfo {
@@ -112,6 +115,7 @@ impl SourceInfo {
             repeats: Repeats::Nothing,
             counts: Counts::Asked,
             pixels: PixelNoise::Independent,
+            stratified: false,
         }
     }
 
@@ -124,6 +128,11 @@ impl SourceInfo {
     /// The same with another [`SourceInfo::pixels`].
     pub fn with_pixels(self, pixels: PixelNoise) -> Self {
         Self { pixels, ..self }
+    }
+
+    /// The same with another [`SourceInfo::stratified`].
+    pub fn with_stratified(self, stratified: bool) -> Self {
+        Self { stratified, ..self }
     }
 
     /// The same with another [`SourceInfo::aims`].

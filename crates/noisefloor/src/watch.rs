@@ -44,7 +44,9 @@
 //! of the same sign, without what the noise of a tile has in common with its picture, since a Markov chain's
 //! brightness wanders as a whole. And z is divided by √R, where R is how much more energy the noise of four
 //! watched pixels in a row has in sum than in each. A source that says that its pixels share samples
-//! ([`PixelNoise::Shared`](crate::source::PixelNoise)) gives one term a tile. Certain is only what has, in
+//! ([`PixelNoise::Shared`](crate::source::PixelNoise)) gives one term a tile. Of one whose samples complete each other
+//! ([`SourceInfo::stratified`](crate::SourceInfo)), what rests on noise that falls as 1/n is left out, and without
+//! halves, where all batches are of one sequence, what rests on independent batches. Certain is only what has, in
 //! addition, a correlation Σt/Σ|t| of at least a fifth; running means have 0.4 and more.
 //!
 //! # What is not noticed
@@ -96,6 +98,9 @@ pub(crate) struct Watch {
     grid: TileGrid,
     /// Pixels share samples, as their source says.
     shared: bool,
+    /// Samples complete each other, as their source says: those of one sequence, or of two.
+    #[cfg_attr(feature = "files", serde(skip))]
+    sequences: Option<u32>,
     tiles: Vec<TileWatch>,
     /// Of all groups, and of those between the last two looks.
     sums: [Sums; 2],
@@ -122,6 +127,7 @@ impl Watch {
         Self {
             grid,
             shared: false,
+            sequences: None,
             tiles: vec![TileWatch::default(); grid.len()],
             sums: [Sums::default(); 2],
             borders_at: 0,
@@ -134,6 +140,10 @@ impl Watch {
 
     pub(crate) fn set_linear(&mut self) {
         self.linear = true;
+    }
+
+    pub(crate) fn set_sequences(&mut self, sequences: Option<u32>) {
+        self.sequences = sequences;
     }
 
     pub(crate) fn set_pixels(&mut self, pixels: PixelNoise) {
@@ -160,7 +170,8 @@ impl Watch {
             && kept.tiles.len() == self.grid.len()
             && self.grid.tiles().zip(&kept.tiles).all(fits);
         if fits {
-            *self = Self { shared: self.shared || kept.shared, linear: self.linear || kept.linear, ..kept };
+            let (shared, linear) = (self.shared || kept.shared, self.linear || kept.linear);
+            *self = Self { shared, linear, sequences: self.sequences, ..kept };
         }
         fits
     }
@@ -287,6 +298,7 @@ impl Watch {
         let mut values = Values::default();
         for tile in &mut self.tiles {
             let found = std::mem::take(&mut tile.sums);
+            let found = self.sequences.map_or(found, |number| found.of_points(number == 1));
             self.sums.iter_mut().for_each(|sums| sums.add(&found));
             values.add(&tile.values);
         }

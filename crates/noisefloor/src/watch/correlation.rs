@@ -231,6 +231,14 @@ impl Sums {
         self.shift.add(&more.shift);
     }
 
+    /// What of it counts where samples complete each other. Their noise need not fall with their number, and depends on
+    /// where in its sequence a batch lies; batches of one sequence are not independent.
+    pub(super) fn of_points(self, one_sequence: bool) -> Self {
+        let Self { neighbours, rows, ends, shift, batches, apart, totals, early, early_energies, .. } = self;
+        let pixels = Self { neighbours, rows, ends, shift, ..Self::default() };
+        if one_sequence { pixels } else { Self { batches, apart, totals, early, early_energies, ..pixels } }
+    }
+
     /// By how much watched pixels that are not independent widen z: at least 1.
     fn widening(&self) -> f64 {
         let [sums, all] = self.rows;
