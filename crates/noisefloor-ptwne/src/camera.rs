@@ -51,6 +51,9 @@ pub struct Optics {
     pub window: [[f32; 2]; 2],
     /// What is nearer along the view is not seen, in scene units, 0…1e8.
     pub near: f32,
+    /// Whether the camera sees no light itself: its rays pass surfaces that shine, and find nothing around the scene.
+    /// Mirrors, glass and all other surfaces see both.
+    pub hides_lights: bool,
 }
 
 impl Default for Optics {
@@ -63,6 +66,7 @@ impl Default for Optics {
             mirrored: false,
             window: [[0.0, 1.0]; 2],
             near: 0.0,
+            hides_lights: false,
         }
     }
 }

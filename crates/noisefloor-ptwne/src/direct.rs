@@ -3,7 +3,7 @@
 use crate::accel::Stack;
 use crate::bsdf;
 use crate::camera::Lens;
-use crate::geometry::Intersection;
+use crate::geometry::{Intersection, NO};
 use crate::guide::{Contributions, Guide, GuidedSample};
 use crate::light::LightSample;
 use crate::material::Bsdf;
@@ -95,14 +95,22 @@ impl<'a> Tracer<'a> {
 
     /// Radiance along a ray, times its weight.
     fn radiance(&mut self, branch: Branch) -> Vec3 {
-        let Branch { ray, from, passed, density, weight, eta2, code } = branch;
+        let Branch { mut ray, from, passed, density, weight, eta2, code } = branch;
         let scene = self.scene;
-        let draws = Draws { index: self.index, seed: self.seed(code, Use::Ray) };
-        let hit = scene.closest::<true>(&ray, &mut self.stack, draws);
-        if hit.is_miss() {
-            return weight * self.background(ray.dir, density).0;
-        }
-        let surface = scene.surface(&ray, &hit, draws);
+        let mut draws = Draws { index: self.index, seed: self.seed(code, Use::Ray) };
+        let blind = code == 1 && scene.optics.hides_lights;
+        let (hit, surface) = loop {
+            let hit = scene.closest::<true>(&ray, &mut self.stack, draws);
+            if hit.is_miss() {
+                return if blind { Vec3::ZERO } else { weight * self.background(ray.dir, density).0 };
+            }
+            let surface = scene.surface(&ray, &hit, draws);
+            if !(blind && surface.light != NO) {
+                break (hit, surface);
+            }
+            ray.origin = surface.leave(ray.dir);
+            draws = draws.next();
+        };
         let mut sum = Vec3::ZERO;
         if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
             let own = emitted.light.pdf(from, passed + hit.t, emitted.cos);

@@ -7,7 +7,7 @@
 use crate::accel::Stack;
 use crate::bsdf::{fresnel, pane, refract};
 use crate::filter::Filter;
-use crate::geometry::Intersection;
+use crate::geometry::{Intersection, NO};
 use crate::material::Bsdf;
 use crate::math::{Ray, Vec3, reflect};
 use crate::rng::{Key, mix};
@@ -119,12 +119,20 @@ impl<'a> Eye<'a> {
             // A scene without opacity passes every test of it
             let hit = self.scene.closest::<true>(&way.ray, &mut self.stack, draws);
             if hit.is_miss() {
-                let background = self.scene.background(way.ray.dir, |_, _| 1.0);
+                let background = match way.boundaries {
+                    0 => self.scene.backdrop(way.ray.dir),
+                    _ => self.scene.background(way.ray.dir, |_, _| 1.0),
+                };
                 // NaN becomes 0, too
                 albedo += way.colour * background.max(Vec3::ZERO).min(Vec3::ONE);
                 continue;
             }
             let surface = self.scene.surface(&way.ray, &hit, draws);
+            if way.boundaries == 0 && surface.light != NO && self.scene.optics.hides_lights {
+                let ray = Ray { origin: surface.leave(way.ray.dir), ..way.ray };
+                self.ways.push(Way { ray, ..way });
+                continue;
+            }
             if way.boundaries == BOUNDARIES || !self.passes(&way, &surface) {
                 let colour = surface.material.bsdf.colour(surface.uv, surface.tint);
                 albedo += way.colour * colour.max(Vec3::ZERO).min(Vec3::ONE);

@@ -2,7 +2,7 @@
 
 use crate::accel::Stack;
 use crate::bsdf;
-use crate::geometry::Intersection;
+use crate::geometry::{Intersection, NO};
 use crate::light::{LightSample, Prospect, Receiver};
 use crate::material::Bsdf;
 use crate::math::{self, DELTA, Frame, Ray, Vec3, power_heuristic};
@@ -96,18 +96,22 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         // Where it was sampled, and how far the ray has come since, through surfaces of nothing
         let (mut from, mut passed) = (ray.origin, 0.0);
         let mut depth = 0;
+        let mut sees_lights = !scene.optics.hides_lights;
         loop {
             depth += 1;
             // One step for this ray, and one for the shadow ray from where it ends
             self.draws = self.draws.next().next();
             let hit = scene.closest::<OPACITY>(&ray, self.stack, self.draws);
             if hit.is_miss() {
-                return sum
-                    + throughput
-                        * scene
-                            .background(ray.dir, |light, light_pdf| self.hit_weight(pdf, light, light_pdf));
+                let weight = |light, light_pdf| self.hit_weight(pdf, light, light_pdf);
+                return if sees_lights { sum + throughput * scene.background(ray.dir, weight) } else { sum };
             }
             let surface = scene.surface(&ray, &hit, self.draws);
+            if !sees_lights && surface.light != NO {
+                depth -= 1;
+                ray.origin = surface.leave(ray.dir);
+                continue;
+            }
 
             // Light that the ray hit
             if let Some(emitted) = scene.emitted(&surface, &hit, ray.dir) {
@@ -127,6 +131,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
 
             // Scatter: next event estimation, then a new direction
             let Some(next) = self.scatter(&ray, &surface, throughput, &mut sum) else { return sum };
+            sees_lights = true;
             throughput *= next.weight;
             eta2 *= next.eta2;
             pdf = next.pdf;

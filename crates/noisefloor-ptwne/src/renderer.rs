@@ -244,7 +244,7 @@ impl Ptwne {
                 let [dx, dy] = filter.offset([u, v]);
                 let ray = lens.ray(x as f32 + dx, y as f32 + dy, [lens_u, lens_v]);
                 let mut sample = if empty {
-                    self.scene.background(ray.dir, |_, _| 1.0)
+                    self.scene.backdrop(ray.dir)
                 } else {
                     (self.sample_radiance)(&self.scene, settings, ray, &mut sampler, &mut stack)
                 };

@@ -35,7 +35,7 @@ pub(crate) enum Sky {
 pub struct Scene {
     name: String,
     camera: Camera,
-    optics: Optics,
+    pub(crate) optics: Optics,
     /// The origin of the scene's coordinates, in the caller's.
     origin: Vec3,
     pub(crate) sky: Option<Sky>,
@@ -261,6 +261,11 @@ pub(crate) struct Emitted<'a> {
 }
 
 impl Scene {
+    /// Radiance that a camera sees from `dir` where nothing is in the way.
+    pub(crate) fn backdrop(&self, dir: Vec3) -> Vec3 {
+        if self.optics.hides_lights { Vec3::ZERO } else { self.background(dir, |_, _| 1.0) }
+    }
+
     /// Radiance from `dir` of what is infinitely far away. `weight` is the weight of light that is also
     /// sampled, by the index of its light and the density of the sample given the light.
     #[inline]

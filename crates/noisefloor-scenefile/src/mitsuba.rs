@@ -22,7 +22,7 @@ use crate::loaded::{Loaded, title};
 use crate::options::LoadOptions;
 use context::Context;
 use document::Document;
-use noisefloor_ptwne::SceneBuilder;
+use noisefloor_ptwne::{Optics, SceneBuilder};
 use sensor::View;
 use shapes::Filling;
 use std::path::Path;
@@ -43,12 +43,14 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
     }
     let mut errors = Errors::default();
     let camera = errors.take(context.camera(sensor))?;
-    let max_depth = root.all("integrator").next().map_or(Ok(None), |element| context.max_depth(element))?;
+    let integrator = root.all("integrator").next();
+    let max_depth = integrator.map_or(Ok(None), |element| context.max_depth(element))?;
+    let hides_lights = integrator.map_or(Ok(false), |element| context.hides_emitters(element))?;
 
     // What is in it: without a camera, too, so that all errors are found
     let View { camera, optics, size } = camera.unwrap_or_else(View::any);
     let mut builder = SceneBuilder::new(title(path), camera).map_err(context.refused(sensor))?;
-    builder.optics(optics).map_err(context.refused(sensor))?;
+    builder.optics(Optics { hides_lights, ..optics }).map_err(context.refused(sensor))?;
     let mut filling = Filling::new(builder);
     for shape in root.all("shape") {
         errors.take(context.shape(shape, &mut filling))?;

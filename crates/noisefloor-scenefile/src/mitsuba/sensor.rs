@@ -162,12 +162,18 @@ impl<'d> Context<'d> {
         Ok((fov, axis))
     }
 
+    /// Whether the camera sees no emitters.
+    pub(super) fn hides_emitters(&self, integrator: &'d Element) -> Result<bool, LoadError> {
+        let own = self.boolean(integrator, "hide_emitters", false)?;
+        match integrator.children.iter().find(|child| child.tag == "integrator") {
+            Some(inner) => Ok(self.hides_emitters(inner)? || own),
+            None => Ok(own),
+        }
+    }
+
     /// Longest path in segments, of what renders the scene in Mitsuba; none if it has no limit.
     pub(super) fn max_depth(&self, integrator: &'d Element) -> Result<Option<u32>, LoadError> {
         integrator.ignore(&["rr_depth"]);
-        if self.boolean(integrator, "hide_emitters", false)? {
-            self.ignored(integrator, "`hide_emitters` is ignored: emitters are seen");
-        }
         match integrator.kind() {
             "path" | "volpath" | "volpathmis" | "bdpt" => {}
             "direct" => {

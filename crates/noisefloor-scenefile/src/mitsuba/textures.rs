@@ -29,12 +29,7 @@ impl<'d> Context<'d> {
         name: &str,
         default: f32,
     ) -> Result<Rgb, LoadError> {
-        if let Some(texture) = self.texture(object, name)? {
-            self.approximated(texture, format!("the texture of `{name}` is replaced by its mean"));
-            let image = self.varying(texture, self.image(texture, Quantity::Factor)?.1)?;
-            return Ok(self.means.of(&image));
-        }
-        let colour = self.colour(object, name, Quantity::Factor)?.unwrap_or([default; 3]);
+        let colour = self.constant(object, name, default, Quantity::Factor)?;
         if colour.iter().any(|c| *c > 1.0) {
             self.approximated(
                 object.get(name).unwrap_or(object),
@@ -42,6 +37,23 @@ impl<'d> Context<'d> {
             );
         }
         Ok(colour.map(|c| c.min(1.0)))
+    }
+
+    /// The colour called `name`, or the mean of a texture.
+    fn constant(
+        &self,
+        object: &'d Element,
+        name: &str,
+        default: f32,
+        quantity: Quantity,
+    ) -> Result<Rgb, LoadError> {
+        let Some(texture) = self.texture(object, name)? else {
+            return Ok(self.colour(object, name, quantity)?.unwrap_or([default; 3]));
+        };
+        self.approximated(texture, format!("the texture of `{name}` is replaced by its mean"));
+        let (scale, image) = self.image(texture, quantity)?;
+        let image = self.varying(texture, image)?;
+        Ok(self.means.of(&image).map(|c| c * scale))
     }
 
     /// The light called `name`, 1 if there is none, and what multiplies it over the surface.
@@ -87,7 +99,7 @@ impl<'d> Context<'d> {
     fn image_of_kind(&self, element: &'d Element, quantity: Quantity) -> Result<(f32, Texture), LoadError> {
         let (scale, image) = match element.kind() {
             "bitmap" => self.bitmap(element, quantity)?,
-            "checkerboard" => (1.0, self.checkerboard(element)?),
+            "checkerboard" => self.checkerboard(element, quantity)?,
             "scale" => return self.scale(element, quantity),
             // Read with the mesh
             "mesh_attribute" => {
@@ -231,11 +243,20 @@ impl<'d> Context<'d> {
     }
 
     /// Two by two squares in the unit square.
-    fn checkerboard(&self, element: &'d Element) -> Result<ImageTexture, LoadError> {
-        let a = self.constant_factor(element, "color0", 0.4)?;
-        let b = self.constant_factor(element, "color1", 0.2)?;
+    fn checkerboard(
+        &self,
+        element: &'d Element,
+        quantity: Quantity,
+    ) -> Result<(f32, ImageTexture), LoadError> {
+        let square = |name, default| match quantity {
+            Quantity::Factor => self.constant_factor(element, name, default),
+            Quantity::Light => self.constant(element, name, default, quantity),
+        };
+        let (a, b) = (square("color0", 0.4)?, square("color1", 0.2)?);
+        let scale = a.into_iter().chain(b).fold(1.0, f32::max);
+        let [a, b] = [a, b].map(|colour| colour.map(|c| c / scale));
         let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([a, b, b, a])));
-        Ok(ImageTexture { to_uv: self.to_uv(element)?, nearest: true, ..image })
+        Ok((scale, ImageTexture { to_uv: self.to_uv(element)?, nearest: true, ..image }))
     }
 
     /// `to_uv`, for v that counts from below: Mitsuba's counts from the top of the picture.

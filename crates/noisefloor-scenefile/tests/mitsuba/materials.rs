@@ -79,6 +79,13 @@ fn checkerboards_lie_as_in_mitsuba() {
     close(shine(&folder(), twice, 0.125, 0.125), [1.0, 0.0, 0.0], 1e-4, "checkerboard");
     close(shine(&folder(), twice, 0.375, 0.125), [0.2; 3], 1e-4, "checkerboard");
     close(shine(&folder(), twice, 0.625, 0.125), [1.0, 0.0, 0.0], 1e-4, "checkerboard");
+    // Light may be above 1, as in Mitsuba 3.9.1
+    for bright in [r#"<float name="color0" value="5"/>"#, r#"<spectrum name="color0" value="5"/>"#] {
+        let bright = format!(r#"type="checkerboard">{bright}"#);
+        for ((u, v), want) in QUARTERS.into_iter().zip([5.0, 0.2, 0.2, 5.0]) {
+            close(shine(&folder(), &bright, u, v), [want; 3], 1e-4, &bright);
+        }
+    }
 }
 
 /// OBJ files have v run up the picture, PLY files as Mitsuba.

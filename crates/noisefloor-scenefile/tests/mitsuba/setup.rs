@@ -154,9 +154,48 @@ fn path_lengths_are_read() {
     }
     let zero = r#"<integrator type="path"><integer name="max_depth" value="0"/></integrator>"#;
     assert!(folder.body(zero).unwrap_err().contains("line 2: `max_depth` is 0"));
-    let other = folder
-        .body(r#"<integrator type="ptracer"><boolean name="hide_emitters" value="true"/></integrator>"#);
-    assert_eq!(other.unwrap().warnings.len(), 2);
+    let other = folder.body(r#"<integrator type="ptracer"/>"#);
+    assert_eq!(other.unwrap().warnings.len(), 1);
+}
+
+/// The camera sees through what shines, and black around the scene; mirrors and glass see both (Mitsuba 3.9.1).
+#[test]
+fn hidden_emitters_are_not_seen() {
+    let folder = Folder::new();
+    let hidden = r#"<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>"#;
+    let lamp = r#"<shape type="rectangle"><transform name="to_world"><scale value=".3"/></transform>
+        <emitter type="area"><rgb name="radiance" value="4"/></emitter></shape>"#;
+    let sky = r#"<emitter type="constant"/>"#;
+    let behind = |bsdf: &str| {
+        format!(
+            r#"<shape type="rectangle"><transform name="to_world"><scale value="50"/><translate z="-1"/></transform>
+            <bsdf type="{bsdf}</bsdf></shape>"#
+        )
+    };
+    let wall = behind(r#"diffuse"><rgb name="reflectance" value=".5"/>"#);
+    let mirror = behind(r#"conductor"><string name="material" value="none"/>"#);
+    let pane = r#"<shape type="rectangle"><transform name="to_world"><scale value="50"/><translate z="1"/></transform>
+        <bsdf type="thindielectric"><float name="int_ior" value="1.5"/></bsdf></shape>"#;
+    for (body, seen, unseen) in [
+        (lamp.to_owned(), 4.0, 0.0),
+        (sky.to_owned(), 1.0, 0.0),
+        (format!("{mirror}{sky}"), 1.0, 1.0),
+        // A pane reflects 2·0.04/1.04 of the sky, and shows the lamp behind it
+        (format!("{pane}{lamp}{sky}"), 4.0 - 3.0 * 0.076923, 4.0 - 3.0 * 0.076923),
+    ] {
+        close(folder.see(&body), [seen; 3], 2e-2, &body);
+        close(folder.see(&format!("{hidden}{body}")), [unseen; 3], 2e-2, &body);
+        let loaded = folder.body(&format!("{hidden}{body}")).unwrap();
+        assert_eq!(loaded.warnings, [], "{body}");
+        let nested =
+            format!(r#"<integrator type="aov"><string name="aovs" value="a:depth"/>{hidden}</integrator>"#);
+        close(folder.see(&format!("{nested}{body}")), [unseen; 3], 2e-2, &body);
+    }
+    // The lamp lights the wall behind it only from its back, where it does not shine; the sky around does
+    let before = format!("{wall}{lamp}{sky}");
+    let without = folder.see(&format!("{wall}{sky}"))[0];
+    let seen = folder.see(&format!("{hidden}{before}"))[0];
+    assert!(seen < without && seen > 0.8 * without, "{seen} beside {without}");
 }
 
 #[test]
