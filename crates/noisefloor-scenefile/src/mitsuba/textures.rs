@@ -39,7 +39,8 @@ impl<'d> Context<'d> {
         Ok(colour.map(|c| c.min(1.0)))
     }
 
-    /// The colour called `name`, or the mean of a texture.
+    /// The colour called `name`, or the mean of a texture, which may be above 1. To Mitsuba, spectra in textures are those
+    /// of factors in lights, too.
     fn constant(
         &self,
         object: &'d Element,
@@ -48,7 +49,7 @@ impl<'d> Context<'d> {
         quantity: Quantity,
     ) -> Result<Rgb, LoadError> {
         let Some(texture) = self.texture(object, name)? else {
-            return Ok(self.colour(object, name, quantity)?.unwrap_or([default; 3]));
+            return Ok(self.colour(object, name, Quantity::Factor)?.unwrap_or([default; 3]));
         };
         self.approximated(texture, format!("the texture of `{name}` is replaced by its mean"));
         let (scale, image) = self.image(texture, quantity)?;
