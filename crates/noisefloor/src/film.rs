@@ -252,6 +252,7 @@ impl Film {
     ///
     /// # Panics
     /// If the tile does not exist.
+    #[doc(hidden)]
     pub fn half_counts(&self, tile: usize) -> [u64; 2] {
         self.counts[tile]
     }
@@ -269,6 +270,7 @@ impl Film {
     ///
     /// # Panics
     /// If the tile does not exist.
+    #[doc(hidden)]
     pub fn request(&self, tile: usize, spp: u64) -> Request {
         self.request_after(tile, self.counts[tile], spp)
     }
@@ -465,6 +467,7 @@ impl Film {
     ///
     /// # Panics
     /// If the tile does not exist.
+    #[doc(hidden)]
     pub fn unsampled_pixels(&self, tile: usize) -> usize {
         let rect = self.grid.tile(tile);
         let kept_out = self.halves.iter().any(|half| !half.rejected.is_empty());
@@ -534,6 +537,7 @@ impl Film {
     ///
     /// # Panics
     /// If [`ToneMapping::check`] refuses the parameters.
+    #[doc(hidden)]
     pub fn settle(&self, tone: &ToneMapping) -> Settled {
         let (grid, halves) = (self.grid, self.has_halves());
         // Found once for each column and row

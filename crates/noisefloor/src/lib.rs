@@ -25,7 +25,7 @@
 //! # Threads
 //! [`Session::judge`] and [`Session::push_image`] use all threads of the rayon pool that they are called in: the global one,
 //! or your own by `pool.install(|| session.judge())`. Results do not depend on their number. A verdict on a tile of 128×128
-//! pixels takes 0.4 ms of one processor (`docs/benchmarks/cost.md` of the project); a
+//! pixels takes 0.4 ms of one processor; a
 //! [`Background`](background::Background) session judges in a thread of its own.
 //!
 //! ```
@@ -89,20 +89,33 @@ pub mod viewing {
 
 // For `Session`
 #[cfg(feature = "files")]
+#[doc(inline)]
 pub use checkpoint::Checkpoint;
+#[doc(inline)]
 pub use criterion::{FixedSpp, StoppingCriterion, Verdict};
+#[doc(inline)]
 pub use display::ToneMapping;
+#[doc(inline)]
 pub use film::Film;
+#[doc(inline)]
 pub use model::Model;
+#[doc(inline)]
 pub use oracle::{Oracle, People};
+#[doc(inline)]
 pub use params::{Audience, Params, Schedule};
+#[doc(inline)]
 pub use rgb::Rgb;
+#[doc(inline)]
 pub use session::{Session, SessionError, Stop, StopReason};
+#[doc(inline)]
 pub use tile::{Tile, TileGrid};
+#[doc(inline)]
 pub use viewing::Viewing;
 
 // For `Driver`
+#[doc(inline)]
 pub use driver::{Driver, DriverError, Event};
 
 // For `ProgressiveSource`
+#[doc(inline)]
 pub use source::{Batch, Counts, ProgressiveSource, Repeats, Request, SourceError, SourceInfo, Unit};

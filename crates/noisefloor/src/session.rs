@@ -184,6 +184,7 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Says what the samples depend on, for checkpoints: a session whose source has changed is not resumed. A
     /// [`Driver`](crate::Driver) does this by itself.
+    #[doc(hidden)]
     pub fn set_source(&mut self, source: SourceIdentity) {
         self.source = source;
     }

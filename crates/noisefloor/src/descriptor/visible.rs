@@ -11,12 +11,12 @@
 //! its root mean square is small; there, the mean of fourth order over its window counts, divided by a ratio of the two
 //! that the noise of nearly all zones stays below. And that all else in a picture is clean makes no noise invisible: a
 //! picture counts as at least 1.25 times as noisy as each of its tiles. The first leaves the scores as they are; the
-//! second makes the error 1 % larger, and keeps grain out of the worst places (docs/accuracy.md).
+//! second makes the error 1 % larger, and keeps grain out of the worst places.
 //!
 //! Two more numbers say what the tile is made of, its texture and its brightness: unfamiliar tiles are told by
 //! them. Two are the picture's, its noise and its brightness: people judge a tile in its picture, and ask for more
 //! samples in bright pictures than the vision model expects. The noise of a picture is a quantile over its
-//! tiles, not a mean of high order, so that one bad spot does not make all tiles wait. `docs/accuracy.md` has the scores, with all of this chosen without the scenes that are scored.
+//! tiles, not a mean of high order, so that one bad spot does not make all tiles wait.
 
 use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDescriptor};
 use super::texture::texture_energy;

@@ -16,7 +16,7 @@ const HEADER: usize = 8 + 4 + 8 + 32;
 
 impl Model {
     /// The model trained on the human data of LISIC (nine scenes and two SIN3D views), inside the library; see the
-    /// project's `docs/guide.md` for the command that makes it.
+    /// project's guide for the command that makes it.
     pub fn bundled() -> Self {
         Self(parts(&mut Payload(&FILE[HEADER..])))
     }

@@ -20,6 +20,7 @@ impl<C: StoppingCriterion> Session<C> {
     /// nothing else. So the same batches come, and the film is the same to the bit, in whatever order and on
     /// how many machines tiles are sampled. In a large picture a tile's batches begin with one sample and
     /// double, so that the whole picture is seen soon.
+    #[doc(hidden)]
     pub fn next_batches(&self) -> Vec<Request> {
         let wish = |index: usize| {
             let goal = self.tiles[index].goal.spp();
@@ -31,6 +32,7 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Whether every open tile has what its next verdict needs. A driver judges then, and no sooner: verdicts
     /// depend on the whole picture, and so not on the order in which tiles are sampled.
+    #[doc(hidden)]
     pub fn is_round_complete(&self) -> bool {
         (0..self.tiles.len()).all(|index| !self.is_open(index) || self.is_due(index))
     }
@@ -43,6 +45,7 @@ impl<C: StoppingCriterion> Session<C> {
     ///
     /// # Panics
     /// If the tile does not exist.
+    #[doc(hidden)]
     pub fn batches_ahead(&self, tile: usize) -> Vec<Request> {
         let mut batches = Vec::new();
         if !self.is_open(tile) {
