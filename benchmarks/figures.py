@@ -222,6 +222,20 @@ def rendered(scene, *options):
         return json.loads(pathlib.Path(out, "report.json").read_text()), list(csv.DictReader(open(f"{out}/stops.csv")))
 
 
+def first_picture():
+    """What the Cornell box has lost where it stops, against 8,192 samples of another seed. Needs what look.py needs."""
+    with tempfile.TemporaryDirectory() as out:
+        size = ["--size", "384x384", "--tile", "64", "--quiet", "--force", "--out"]
+        run(NOISEFLOOR, "render", "cornell-box", *size, f"{out}/stopped")
+        run(NOISEFLOOR, "render", "cornell-box", "--criterion", "spp:8192", "--seed", "1098", *size, f"{out}/reference")
+        print(run(sys.executable, "benchmarks/look.py", "picture", f"{out}/stopped", f"{out}/reference"))
+
+
+def people_lost():
+    """What zones had lost where people stopped. Needs what look.py needs."""
+    print(run(sys.executable, "benchmarks/look.py", "people", HUMAN))
+
+
 def films():
     """Samples until all tiles have converged, of a still and of frames."""
     rows = []
