@@ -1,32 +1,31 @@
 #!/usr/bin/env python3
 """Where samples go in pictures of some size, by every rule at once: docs/benchmarks/denoised.md.
 
-    larger.py render EXAMPLE OUT MOST SCENE…    stores levels of two seeds, and a reference, by `denoised_corpus`; goes on where it stopped
+    larger.py render EXAMPLE OUT MOST SCENE…    stores levels of two seeds, and a reference; EXAMPLE is `denoised_corpus` of noisefloor-cli; goes on where it stopped
     larger.py gather OUT > larger.csv
     larger.py tables larger.csv                 every rule, played on what is stored
     larger.py plot larger.csv OUT.svg           loss against run time; needs matplotlib
-    larger.py whole NOISEFLOOR EXAMPLE OUT SCENE    renders a scene by the rule itself, and measures it with the same references
 
 A scene's folder has `1` and `2`, the seeds: halves at levels of samples, and what Open Image Denoise makes of them. A tile is sampled on
 only to four times what it, or one beside it, needs for a loss that is hardly noticed; beyond that, losses are taken to fall as they do
 on average. The reference has four times the samples of each tile, of a third seed, and is joined with the last level of the other seed.
-Needs numpy; scipy for denoised_corpus.py."""
+Needs numpy."""
 import argparse
 import csv
-import json
 import pathlib
 import subprocess
 import sys
-import tempfile
 
 import numpy as np
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent))
-import at_the_stop as shown  # noqa: E402
-import denoised_corpus as corpus  # noqa: E402
-from denoised_corpus import DECAY, GAIN, LEAST, LIMIT, MARGIN, NOISY_REFERENCE, TOGETHER  # noqa: E402
-
-SIZE, TILE, SQUARE = (240, 135), 32, 64
+LIMIT, LEAST, DECAY = 0.3, 1e-3, 0.38
+# Tiles whose reference has itself lost as much are left out
+NOISY_REFERENCE = 0.1
+# The rule: power, step, margin from 16 tiles on; and the margin of each tile to the limit
+TOGETHER, STEP, MARGIN, BEFORE = 0.72, 1.2, 1.1, 1.5
+# What verdicts count the mean of four as
+GAIN = 0.97
+SIZE, TILE = (240, 135), 32
 SEEDS = ("1", "2")
 REFERENCE_SEED, REFERENCE_TIMES = "77", 4
 RULES = ("dammertz", "relative-error", "cycles")
@@ -134,40 +133,6 @@ def gather(args):
                 rows.writerow([*lead, level, tile, int(spp), f"{seconds:.3f}", *values, *(f"{v:.4g}" for v in least[:, i, tile])])
 
 
-def around(left, right, top, bottom):
-    """The square of 64 pixels around a tile, within the picture, as a verdict sees it."""
-    at = lambda low, high, side: min(max(low + (high - low) // 2 - SQUARE // 2, 0), side - SQUARE)
-    x, y = at(left, right, SIZE[0]), at(top, bottom, SIZE[1])
-    return x, x + SQUARE, y, y + SQUARE
-
-
-def greys(folder, made):
-    """Luma of a picture and of what is true, and which tiles and squares of it."""
-    truth = 0.5 * (load(folder / "reference-a.f32") + load(folder / "reference-b.f32"))
-    display = corpus.Display(truth)
-    test, reference = display.luma(made), display.luma(truth)
-    return [[(test[t:b, l:r], reference[t:b, l:r]) for l, r, t, b in (tile, around(*tile))] for tile in TILES]
-
-
-def whole(args):
-    """The rule itself, and what its picture has lost against the references of the same seed; lines of CSV."""
-    out = args.out / name(args.scene)
-    for seed in SEEDS:
-        with tempfile.TemporaryDirectory() as run:
-            options = ["--denoise", "oidn", "--size", "x".join(map(str, SIZE)), "--seed", seed, "--threads", "1", "--force", "--quiet"]
-            subprocess.run([args.noisefloor, "render", args.scene, *options, "--out", run], check=True)
-            made = shown.load(f"{run}/image-denoised.exr:0")[0]
-            stops = list(csv.DictReader(open(f"{run}/stops.csv")))
-            report = json.loads(pathlib.Path(f"{run}/report.json").read_text())
-        pairs = [pair for tile in greys(out / seed, made) for pair in tile]
-        data = b"".join(np.array(a.shape[::-1], dtype="<u4").tobytes() + a.astype("<f4").tobytes() + b.astype("<f4").tobytes() for a, b in pairs)
-        said = subprocess.run([args.example, "jods"], input=data, capture_output=True, check=True).stdout.split()
-        lost = np.array(said, dtype=float).reshape(-1, 2).min(1)
-        for stop, value in zip(stops, lost):
-            print(",".join([out.name, seed, stop["tile"] if "tile" in stop else "", stop["spp"], stop["reason"], f"{value:.3f}"]), flush=True)
-        print(json.dumps({k: report[k] for k in report if "second" in k or "denois" in k})[:600], file=sys.stderr)
-
-
 class Picture:
     """All that is known of a scene and seed, by level and tile."""
 
@@ -241,9 +206,28 @@ class Outcome:
         return self.done[self.picture.good]
 
 
+def play(estimate, first, limit, power, spp, share=1):
+    """The rule as it runs, in one picture of tiles × levels: the last level of each tile, and whether it was satisfied there.
+    The last of `spp` is what tiles count that are never satisfied; others are drawn to what this share of them needs."""
+    last = len(spp) - 1
+    levels = np.full(len(estimate), np.searchsorted(spp, first))
+    need, fresh = np.full(len(estimate), -1), np.ones(len(estimate), bool)
+    while True:
+        for i in np.flatnonzero(fresh):
+            satisfied = levels[i] < last and estimate[i, levels[i]] <= limit
+            need[i] = (need[i] if need[i] >= 0 else levels[i]) if satisfied else -1
+        done = need >= 0
+        most = np.quantile(np.where(done, spp[need], spp[levels]), share, method="higher")
+        wanted = spp[np.maximum(need, 0)] ** power * most ** (1 - power)
+        fresh = (levels < last) & (~done | (wanted >= STEP * spp[levels]))
+        if not fresh.any():
+            return levels, done
+        levels = levels + fresh
+
+
 def ours(picture, first=32, margin=MARGIN, power=TOGETHER):
     says, limit = picture.says(), LIMIT / margin
-    levels, done = corpus.play(says.T, first, limit, power, above(picture))
+    levels, done = play(says.T, first, limit, power, above(picture))
     here = np.minimum(levels, len(picture.spp) - 1), np.arange(len(levels))
     return Outcome(picture, levels, done, done & (GAIN * picture.estimate[here] > limit))
 
@@ -276,7 +260,7 @@ def hindsight(scenes, rule):
 
 def rules(scenes):
     """Every rule in every picture, by its name."""
-    before = lambda picture: ours(picture, 48, corpus.BEFORE, 1)
+    before = lambda picture: ours(picture, 48, BEFORE, 1)
     every = {"ours": ours, "before: each to the limit, ×1.5, from 48": before, "one count, when all are satisfied": together}
     found = {label: {scene: [rule(p) for p in pictures] for scene, pictures in scenes.items()} for label, rule in every.items()}
     for rule in RULES:
@@ -399,12 +383,12 @@ def plot(args):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(required=True)
-    words = {render: ["example", "out", "most", "scenes"], gather: ["out"], whole: ["noisefloor", "example", "out", "scene"], tables: ["rows"], plot: ["rows", "out"]}
+    words = {render: ["example", "out", "most", "scenes"], gather: ["out"], tables: ["rows"], plot: ["rows", "out"]}
     for command, names in words.items():
         sub = commands.add_parser(command.__name__)
         sub.set_defaults(run=command)
         for word in names:
-            sub.add_argument(word, nargs="+" if word == "scenes" else None, type=str if word in ("most", "scenes", "scene") else pathlib.Path)
+            sub.add_argument(word, nargs="+" if word == "scenes" else None, type=str if word in ("most", "scenes") else pathlib.Path)
     args = parser.parse_args()
     args.run(args)
 

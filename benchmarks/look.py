@@ -12,12 +12,40 @@ import csv, json, math, pathlib, random, secrets, sys
 import numpy as np, torch
 from PIL import Image
 from scipy.ndimage import uniform_filter
+import OpenEXR
 import pycvvdp
-from at_the_stop import load, shown
 
 torch.set_num_threads(1)
 mapped = pycvvdp.cvvdp(display_name="standard_fhd", heatmap="raw", quiet=True)
 plain = pycvvdp.cvvdp(display_name="standard_fhd", quiet=True)
+
+WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
+
+
+def load(name):
+    """Linear RGB and samples of each pixel."""
+    folder = pathlib.Path(name)
+    path, _, spp = (str(folder / "image.exr"), "", None) if folder.is_dir() else name.rpartition(":")
+    if not folder.is_dir():
+        path, spp = name.rsplit(":", 1)
+    with OpenEXR.File(path) as file:
+        channels = {key: channel.pixels for part in file.parts for key, channel in part.channels.items()}
+    key = next((k for k in ("RGB", "RGBA", "ViewLayer.Combined") if k in channels), None)
+    rgb = channels[key][..., :3] if key else np.stack([channels[c] for c in "RGB"], -1)
+    samples = np.full(rgb.shape[:2], float(spp or 0))
+    if folder.is_dir():
+        with open(folder / "stops.csv") as file:
+            for t in csv.DictReader(file):
+                x, y, w, h = (int(t[k]) for k in ("x", "y", "width", "height"))
+                samples[y : y + h, x : x + w] = float(t["spp"])
+    return rgb.astype(float), samples
+
+
+def shown(rgb, gain):
+    rgb = np.maximum(rgb * gain, 0)
+    rgb = np.clip(rgb / (1 + rgb @ WEIGHTS)[..., None], 0, 1)
+    encoded = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * np.maximum(rgb, 1e-9) ** (1 / 2.4) - 0.055)
+    return Image.fromarray(np.round(encoded * 255).astype(np.uint8))
 
 
 def contrast(test, truth, edge):

@@ -1,4 +1,4 @@
-//! Pictures to learn from how wrong denoised pictures are: benchmarks/denoised_corpus.py runs it.
+//! Pictures to learn from how wrong denoised pictures are: benchmarks/larger.py runs it.
 //!
 //! `denoised_corpus render FOLDER SCENE EDGE`: renders a scene with the built-in path tracer, square, as `render --denoise oidn`
 //! does, and writes it at many numbers of samples: both halves, what Open Image Denoise makes of each half and of all samples with
