@@ -31,12 +31,15 @@ fn tile(c: &mut Criterion) {
         pixels.iter().map(|p| 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]).collect()
     };
     let (grey_picture, grey_residual) = (grey(&picture), grey(&residual));
-    let rgb = ResidualPixels::Rgb { picture: &picture, residual: &residual };
+    let planes =
+        [&picture, &residual].map(|of| [0, 1, 2].map(|c| of.iter().map(|p| p[c]).collect::<Vec<f32>>()));
+    let [of_picture, of_residual] = planes.each_ref().map(|planes| planes.each_ref().map(Vec::as_slice));
+    let rgb = ResidualPixels::Rgb { picture: of_picture, residual: of_residual };
     let grey = ResidualPixels::Grey { picture: &grey_picture, residual: &grey_residual };
     let model = VisionModel::new(&Viewing::default());
     let of_film = VisionModel::new(&"desk,fps=24".parse().expect("viewing conditions"));
     let mut workspace = VisionWorkspace::default();
-    let below = |colour, highest| VisionDetail { colour, frequencies: (1.0, highest) };
+    let below = |chromatic_below, highest| VisionDetail { chromatic_below, frequencies: (1.0, highest) };
 
     let mut group = c.benchmark_group("tile of 128x128");
     group.throughput(Throughput::Elements((TILE * TILE) as u64));
@@ -44,12 +47,13 @@ fn tile(c: &mut Criterion) {
         ("colour, all bands", &model, rgb, VisionDetail::FULL),
         ("colour, all bands, of a film", &of_film, rgb, VisionDetail::FULL),
         ("of a grey picture in a film, above 1", &of_film, grey, VisionDetail::FAST),
-        ("colour, above 1", &model, rgb, below(true, 100.0)),
-        ("colour, 1 to 15", &model, rgb, below(true, 15.0)),
+        ("colour, above 1", &model, rgb, below(100.0, 100.0)),
+        ("colour of verdicts", &model, rgb, VisionDetail::COLOUR),
+        ("colour, 1 to 15", &model, rgb, below(15.0, 15.0)),
         ("light and dark, above 1", &model, rgb, VisionDetail::FAST),
-        ("light and dark, 1 to 15", &model, rgb, below(false, 15.0)),
+        ("light and dark, 1 to 15", &model, rgb, below(0.0, 15.0)),
         ("of a grey picture, above 1", &model, grey, VisionDetail::FAST),
-        ("of a grey picture, 1 to 15", &model, grey, below(false, 15.0)),
+        ("of a grey picture, 1 to 15", &model, grey, below(0.0, 15.0)),
     ] {
         let inner = HALO..HALO + TILE;
         let patch = ResidualPatch { pixels, size: (edge, edge), columns: inner.clone(), rows: inner };

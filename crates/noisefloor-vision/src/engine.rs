@@ -6,7 +6,7 @@ use crate::lanes::{STRIP, map_rows};
 use crate::masking::{
     BLUR_RADIUS, Blur, Masking, Row, blur, blur_row, contrast_row, mask_rows, transient_row,
 };
-use crate::photometry::{CHANNELS, Photometry, greys, opponent_row};
+use crate::photometry::{CHANNELS, Photometry, greys, opponent_planes, opponent_row};
 use crate::pyramid::{Size, expand_row, reduce};
 use crate::temporal::{ALL_CHANNELS, TRANSIENT, gains};
 use crate::viewing::Viewing;
@@ -64,6 +64,21 @@ impl Engine {
             let mut planes: [&mut [f32]; N] = std::array::from_fn(|_| row().expect("at most three channels"));
             opponent_row(&self.photometry, codes, &mut planes);
         }
+    }
+
+    /// Converts planes of red, green and blue into the finest level of picture `of`: of a picture and a share of its residual.
+    pub(crate) fn load_planes<const N: usize>(
+        &self,
+        of: usize,
+        size: Size,
+        workspace: &mut VisionWorkspace,
+        picture: [&[f32]; 3],
+        (share, residual): (f32, [&[f32]; 3]),
+    ) {
+        let mut channels = workspace.gauss[of].iter_mut();
+        let mut next = || channels.next().map(|levels| &mut levels[0][..size.area()]);
+        let mut planes: [&mut [f32]; N] = std::array::from_fn(|_| next().expect("at most three channels"));
+        opponent_planes(&self.photometry, picture, (share, residual), &mut planes);
     }
 
     /// Converts greys into the finest level of picture `of`, only its achromatic channel: of a picture and a share of its residual.

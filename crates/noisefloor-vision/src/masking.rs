@@ -173,17 +173,16 @@ impl Masking {
     }
 }
 
-/// Room for a strip: powers of masking contrasts by channel, what masks, and differences before they are masked.
+/// Room for a strip: powers of masking contrasts by channel, and differences before they are masked.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskScratch {
     powers: [[f32; STRIP]; CHANNELS],
-    mask: [f32; STRIP],
     before: [f32; STRIP],
 }
 
 impl Default for MaskScratch {
     fn default() -> Self {
-        Self { powers: [[0.0; STRIP]; CHANNELS], mask: [0.0; STRIP], before: [0.0; STRIP] }
+        Self { powers: [[0.0; STRIP]; CHANNELS], before: [0.0; STRIP] }
     }
 }
 
@@ -197,7 +196,7 @@ pub(crate) fn mask_rows<const N: usize>(
     (smaller, size, first): ([&[f32]; N], Size, usize),
     differences: [&mut [f32]; N],
     transient: Option<&mut [f32]>,
-    MaskScratch { powers, mask, before }: &mut MaskScratch,
+    MaskScratch { powers, before }: &mut MaskScratch,
 ) {
     let from = first * size.width;
     let length = differences[0].len();
@@ -221,7 +220,7 @@ pub(crate) fn mask_rows<const N: usize>(
         for (channel, out) in channels.iter_mut().enumerate() {
             let Some(out) = out else { continue };
             let out = &mut out[at..][..n];
-            let (mask, before) = (&mut mask[..n], &mut before[..n]);
+            let before = &mut before[..n];
             before.copy_from_slice(out);
             if greys {
                 // In one loop: most of the time of a tile is spent here
@@ -232,12 +231,17 @@ pub(crate) fn mask_rows<const N: usize>(
                 });
                 continue;
             }
-            mask.fill(1.0);
-            for (power, weights) in powers[..N].iter().zip(&masking.weights) {
-                let weight = weights[channel];
-                mask.iter_mut().zip(power).for_each(|(mask, power)| *mask += weight * power);
+            let [a, b, c] = masking.weights.map(|row| row[channel]);
+            if N == CHANNELS {
+                let rows = [before, &powers[0][..n], &powers[1][..n], &powers[2][..n]];
+                map_rows(rows, [out], |[difference, of_a, of_b, of_c]| {
+                    [masking.visible(difference, 1.0 + a * of_a + b * of_b + c * of_c)]
+                });
+            } else {
+                map_rows([before, &powers[0][..n]], [out], |[difference, of_a]| {
+                    [masking.visible(difference, 1.0 + a * of_a)]
+                });
             }
-            map_rows([before, mask], [out], |[difference, mask]| [masking.visible(difference, mask)]);
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::math::{exp2, pow};
 use crate::viewing::{Eotf, Primaries, Viewing};
 use multiversion::multiversion;
 use std::f32::consts::LOG2_E;
+use std::ops::Range;
 
 /// The opponent channels: achromatic, red–green, yellow–violet.
 pub(crate) const CHANNELS: usize = 3;
@@ -31,6 +32,10 @@ const XYZ_TO_LMS: [[f64; 3]; 3] = [
 /// al. 2024, §3.2).
 const LMS_TO_DKL: [[f64; 3]; 3] =
     [[1.0, 1.0, 0.0], [1.0, -2.311_130_179_947_035, 0.0], [-1.0, -1.0, 50.977_571_328_718_78]];
+
+/// Pixels that are converted at a time, channel by channel, as vector instructions want it: few enough to stay in the nearest
+/// cache.
+const AT_ONCE: usize = 128;
 
 /// The lowest luminance that displays of linear or PQ values show, in cd/m².
 const DARKEST: f32 = 0.005;
@@ -91,6 +96,19 @@ impl Photometry {
         let [mut r, mut g, mut b] = code.map(|value| [value]);
         self.shine([&mut r, &mut g, &mut b]);
         [r[0], g[0], b[0]]
+    }
+
+    /// Turns code values into light, and that into opponent channels, which `here` is the place of.
+    #[inline(always)]
+    fn oppose(&self, codes: &mut [[f32; AT_ONCE]; 3], here: Range<usize>, planes: &mut [&mut [f32]]) {
+        let [r, g, b] = codes.each_mut().map(|channel| &mut channel[..here.len()]);
+        self.shine([&mut *r, &mut *g, &mut *b]);
+        for (plane, weights) in planes.iter_mut().zip(&self.to_opponent) {
+            let plane = &mut plane[here.clone()];
+            for (((out, r), g), b) in plane.iter_mut().zip(&*r).zip(&*g).zip(&*b) {
+                *out = weights[0] * r + weights[1] * g + weights[2] * b;
+            }
+        }
     }
 
     /// Replaces code values by light, channel by channel.
@@ -200,21 +218,33 @@ fn hlg_gamma(peak: f64, ambient: f64) -> f64 {
 /// Converts a row of code values to opponent channels; as many channels as there are planes.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn opponent_row(photometry: &Photometry, codes: &[[f32; 3]], planes: &mut [&mut [f32]]) {
-    // Channel by channel, as vector instructions want it; few enough to stay in the nearest cache
-    const PIXELS: usize = 128;
-    let mut light = [[0.0; PIXELS]; 3];
-    for (place, codes) in codes.chunks(PIXELS).enumerate() {
-        let [r, g, b] = light.each_mut().map(|channel| &mut channel[..codes.len()]);
+    let mut light = [[0.0; AT_ONCE]; 3];
+    for (place, codes) in codes.chunks(AT_ONCE).enumerate() {
+        let [r, g, b] = &mut light;
         for (((code, r), g), b) in codes.iter().zip(&mut *r).zip(&mut *g).zip(&mut *b) {
             [*r, *g, *b] = *code;
         }
-        photometry.shine([r, g, b]);
-        for (plane, weights) in planes.iter_mut().zip(&photometry.to_opponent) {
-            let plane = &mut plane[place * PIXELS..][..codes.len()];
-            for (((out, r), g), b) in plane.iter_mut().zip(&*r).zip(&*g).zip(&*b) {
-                *out = weights[0] * r + weights[1] * g + weights[2] * b;
-            }
+        photometry.oppose(&mut light, place * AT_ONCE..place * AT_ONCE + codes.len(), planes);
+    }
+}
+
+/// The same of planes of code values, those of a picture and a share of its residual.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn opponent_planes(
+    photometry: &Photometry,
+    picture: [&[f32]; 3],
+    (share, residual): (f32, [&[f32]; 3]),
+    planes: &mut [&mut [f32]],
+) {
+    let mut light = [[0.0; AT_ONCE]; 3];
+    let length = planes[0].len();
+    for from in (0..length).step_by(AT_ONCE) {
+        let here = from..(from + AT_ONCE).min(length);
+        for c in 0..3 {
+            let rows = [&picture[c][here.clone()], &residual[c][here.clone()]];
+            map_rows(rows, [&mut light[c][..here.len()]], |[picture, residual]| [picture + share * residual]);
         }
+        photometry.oppose(&mut light, here, planes);
     }
 }
 

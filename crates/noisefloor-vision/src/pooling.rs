@@ -89,6 +89,7 @@ pub(crate) fn across_channels<const N: usize>(
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 pub(crate) fn across_row<const N: usize>(
     planes: [&[f32]; N],
+    weights: [f32; N],
     transient: Option<&[f32]>,
     growth: f32,
     weight: f32,
@@ -99,9 +100,10 @@ pub(crate) fn across_row<const N: usize>(
         return;
     }
     out.fill(0.0);
-    for plane in planes {
+    for (plane, of_channel) in planes.into_iter().zip(weights) {
         for (out, &d) in out.iter_mut().zip(plane) {
-            let square = grown(d, growth) * grown(d, growth);
+            let difference = of_channel * grown(d, growth);
+            let square = difference * difference;
             *out += square * square;
         }
     }

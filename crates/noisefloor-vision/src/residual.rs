@@ -1,7 +1,7 @@
 //! How visible a residual is on its picture, in a part of that picture: what a stopping rule asks of every
 //! tile.
 
-use crate::check::{check_pixels, check_values, checked};
+use crate::check::{check_values, checked};
 use crate::csf::OpponentChannel;
 use crate::engine::{Adapted, Engine, build, collapse};
 use crate::error::VisionError;
@@ -19,12 +19,12 @@ use std::ops::Range;
 /// values of the display, row by row. Neither is the right one: differences are the same for −`residual`, to the bit.
 #[derive(Clone, Copy, Debug)]
 pub enum ResidualPixels<'a> {
-    /// In colour.
+    /// In colour: a plane for each of red, green and blue.
     Rgb {
         /// The middle.
-        picture: &'a [[f32; 3]],
+        picture: [&'a [f32]; 3],
         /// With half of it added and taken away, the middle makes the two pictures.
-        residual: &'a [[f32; 3]],
+        residual: [&'a [f32]; 3],
     },
     /// As greys: two thirds of the time of the achromatic channel of colours, and blind to noise that is
     /// only in colour.
@@ -53,8 +53,9 @@ pub struct ResidualPatch<'a> {
 /// How much of the model is computed for a residual: less is faster. `docs/benchmarks/cost.md` has a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisionDetail {
-    /// Whether the chromatic channels are computed.
-    pub colour: bool,
+    /// Bands of which the chromatic channels are computed, too: those whose centre lies at this or below, in cycles per
+    /// degree. None at 0.
+    pub chromatic_below: f64,
     /// Bands of the pyramid are computed if their centre lies between these, in cycles per degree; at least
     /// one is.
     pub frequencies: (f64, f64),
@@ -62,9 +63,12 @@ pub struct VisionDetail {
 
 impl VisionDetail {
     /// All channels and bands.
-    pub const FULL: Self = Self { colour: true, frequencies: (0.0, f64::INFINITY) };
+    pub const FULL: Self = Self { chromatic_below: f64::INFINITY, frequencies: (0.0, f64::INFINITY) };
+    /// From one cycle per degree on, with chromatic channels up to ten: above that, they would take a third of the time more, for
+    /// what the weights of [`VisibleDifference::contrast_energy`] make up for in noise of single pixels.
+    pub const COLOUR: Self = Self { chromatic_below: 10.0, ..Self::FAST };
     /// Light and dark only, from one cycle per degree on.
-    pub const FAST: Self = Self { colour: false, frequencies: (1.0, 100.0) };
+    pub const FAST: Self = Self { chromatic_below: 0.0, frequencies: (1.0, 100.0) };
 }
 
 /// Visible differences in a part of a picture; 1 is about the threshold of seeing a difference. It borrows
@@ -74,7 +78,8 @@ pub struct VisibleDifference<'a> {
     workspace: &'a mut VisionWorkspace,
     sizes: Sizes,
     bands: Range<usize>,
-    channels: usize,
+    /// The first band of which chromatic channels are there; the end of all if none are.
+    chromatic: usize,
     film: bool,
     part: Part,
     frequencies: &'a [f64],
@@ -143,18 +148,24 @@ impl VisionModel {
             return Err(VisionError::Region);
         }
         let bands = self.engine.bands.within(size, detail.frequencies);
-        let colour = detail.colour && matches!(patch.pixels, ResidualPixels::Rgb { .. });
-        let channels = if colour { CHANNELS } else { 1 };
+        let of_chroma = |&band: &usize| self.engine.bands.frequencies[band] <= detail.chromatic_below;
+        let chromatic = match patch.pixels {
+            ResidualPixels::Rgb { .. } => bands.clone().find(of_chroma).unwrap_or(bands.end),
+            ResidualPixels::Grey { .. } => bands.end,
+        };
+        let channels = if chromatic < bands.end { CHANNELS } else { 1 };
         let film = self.engine.film.is_some();
         let sizes = workspace.fit(size, bands.end + 1, channels, film);
         load(&self.engine, patch, size, channels, workspace)?;
-        if colour {
-            differ::<CHANNELS>(&self.engine, &sizes, bands.clone(), part, workspace);
+        if channels == 1 {
+            filter_and_build::<1>(&self.engine, &sizes, workspace);
         } else {
-            differ::<1>(&self.engine, &sizes, bands.clone(), part, workspace);
+            filter_and_build::<CHANNELS>(&self.engine, &sizes, workspace);
         }
+        differ::<1>(&self.engine, &sizes, bands.start..chromatic, part, workspace);
+        differ::<CHANNELS>(&self.engine, &sizes, chromatic..bands.end, part, workspace);
         let frequencies = &self.engine.bands.frequencies[bands.clone()];
-        Ok(VisibleDifference { workspace, sizes, bands, channels, film, part, frequencies })
+        Ok(VisibleDifference { workspace, sizes, bands, chromatic, film, part, frequencies })
     }
 }
 
@@ -172,7 +183,7 @@ impl VisibleDifference<'_> {
     /// differences are up to 5 % lower at half the contrast, 11 % with colour; a noisy picture that has lost
     /// noise masks less, so that they are higher.
     pub fn map_at(&mut self, contrast: f32) -> DifferenceBand<'_> {
-        self.draw(contrast.clamp(1e-6, 1e6).powf(EXPONENT), 1.0);
+        self.draw(contrast.clamp(1e-6, 1e6).powf(EXPONENT), 1.0, [1.0; CHANNELS]);
         self.plane(self.bands.start, &self.workspace.map[self.bands.start])
     }
 
@@ -183,7 +194,7 @@ impl VisibleDifference<'_> {
     pub fn contrast_energy(&mut self) -> DifferenceBand<'_> {
         // So weak a residual is nowhere near the limit; what it is weaker by is taken back
         const WEAK: f32 = 1e-4;
-        self.draw(WEAK, 1.0 / WEAK);
+        self.draw(WEAK, 1.0 / WEAK, BESIDE_ACHROMATIC);
         let first = self.bands.start;
         let (part, width) = (self.part.at(first), self.sizes[first].width);
         for y in part.rows() {
@@ -192,21 +203,35 @@ impl VisibleDifference<'_> {
         self.plane(first, &self.workspace.map[first])
     }
 
-    /// Draws the map of a residual whose differences grow by `growth`, times `scale`.
-    fn draw(&mut self, growth: f32, scale: f32) {
-        let bands = self.bands.clone();
-        if self.channels == 1 {
-            draw::<1>(&self.sizes, bands, self.part, self.film, (growth, scale), self.workspace);
-        } else {
-            draw::<CHANNELS>(&self.sizes, bands, self.part, self.film, (growth, scale), self.workspace);
+    /// Draws the map of a residual whose differences grow by `growth`, times `scale`, and those of each channel times a
+    /// weight.
+    fn draw(&mut self, growth: f32, scale: f32, weights: [f32; CHANNELS]) {
+        let Self { sizes, bands, chromatic, film, part, .. } = self;
+        let VisionWorkspace { differences, map, strip, .. } = &mut *self.workspace;
+        let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]);
+        for band in bands.clone() {
+            // The pyramid halves contrasts between its finest and its coarsest band
+            let scale = scale * if *film { 1.0 } else { STILL as f32 } * if band == 0 { 1.0 } else { 0.5 };
+            for y in parts(band).rows() {
+                let Range { start, end } = parts(band).columns();
+                let here = y * sizes[band].width + start..y * sizes[band].width + end;
+                let row = |channel: usize| &differences[channel][band][here.clone()];
+                let (transient, out) = (film.then(|| row(TRANSIENT)), &mut map[band][here.clone()]);
+                if band < *chromatic {
+                    across_row([row(0)], [weights[0]], transient, growth, scale, out);
+                } else {
+                    across_row([0, 1, 2].map(row), weights, transient, growth, scale, out);
+                }
+            }
         }
+        collapse(map, bands.clone(), sizes, |band| parts(band).rows(), &mut strip.narrow, &mut strip.places);
     }
 
-    /// The bands of a channel, finest first, without the transient channel of a film; none for chromatic channels that were not computed.
+    /// The bands of a channel, finest first, without the transient channel of a film; those of chromatic channels that were computed.
     pub fn bands(&self, channel: OpponentChannel) -> impl Iterator<Item = DifferenceBand<'_>> {
         let planes = &self.workspace.differences[channel as usize];
-        let bands = if (channel as usize) < self.channels { self.bands.clone() } else { 0..0 };
-        bands.map(|band| self.plane(band, &planes[band]))
+        let from = if channel == OpponentChannel::Achromatic { self.bands.start } else { self.chromatic };
+        (from..self.bands.end).map(|band| self.plane(band, &planes[band]))
     }
 
     fn plane<'a>(&self, band: usize, plane: &'a [f32]) -> DifferenceBand<'a> {
@@ -228,6 +253,12 @@ pub fn rescaled(difference: f32, contrast: f32) -> f32 {
     grown(difference, contrast.clamp(1e-6, 1e6).powf(EXPONENT))
 }
 
+/// What differences of each channel count for in [`VisibleDifference::contrast_energy`]. It sums over bands, of which the metric
+/// takes the mean of fourth order, and achromatic noise of single pixels is seen in two bands, chromatic in five: of
+/// [`VisionDetail::COLOUR`], four. With these weights, chosen on flat pictures, noise of any colour has lost as many JODs
+/// as grey noise of the same energy, most often within 0.05 (`docs/benchmarks/vision.md`).
+const BESIDE_ACHROMATIC: [f32; CHANNELS] = [1.0, 0.7, 0.7];
+
 /// What the two pictures have of the residual beside the middle between them.
 const SHARES: [f32; 2] = [0.5, -0.5];
 
@@ -239,25 +270,16 @@ fn load(
     channels: usize,
     workspace: &mut VisionWorkspace,
 ) -> Result<(), VisionError> {
-    let width = size.width;
     match patch.pixels {
         ResidualPixels::Rgb { picture, residual } => {
-            for pixels in [picture, residual] {
-                check_pixels(pixels, size)?;
+            for values in picture.into_iter().chain(residual) {
+                check_values(values, size)?;
             }
             for (of, share) in SHARES.into_iter().enumerate() {
-                let row = |y: usize, row: &mut [[f32; 3]]| {
-                    let [picture, residual] = [picture, residual].map(|pixels| &pixels[y * width..][..width]);
-                    let sums = picture.as_flattened().iter().zip(residual.as_flattened());
-                    row.as_flattened_mut()
-                        .iter_mut()
-                        .zip(sums)
-                        .for_each(|(out, (a, b))| *out = a + share * b);
-                };
                 if channels == 1 {
-                    engine.load::<1>(of, size, workspace, row);
+                    engine.load_planes::<1>(of, size, workspace, picture, (share, residual));
                 } else {
-                    engine.load::<CHANNELS>(of, size, workspace, row);
+                    engine.load_planes::<CHANNELS>(of, size, workspace, picture, (share, residual));
                 }
             }
         }
@@ -276,7 +298,13 @@ fn load(
 /// Interpolation of a band reads so far beyond what is wanted of the next finer one.
 const MARGIN: usize = 2;
 
-/// Computes the bands of `N` channels in a part of the picture.
+/// Levels of `N` channels of both pictures.
+fn filter_and_build<const N: usize>(engine: &Engine, sizes: &Sizes, workspace: &mut VisionWorkspace) {
+    engine.filter_both::<N>(sizes[0], workspace);
+    build::<N>(sizes, engine.film.is_some(), workspace);
+}
+
+/// Computes bands of `N` channels in a part of the picture.
 fn differ<const N: usize>(
     engine: &Engine,
     sizes: &Sizes,
@@ -284,39 +312,11 @@ fn differ<const N: usize>(
     part: Part,
     workspace: &mut VisionWorkspace,
 ) {
-    engine.filter_both::<N>(sizes[0], workspace);
-    build::<N>(sizes, engine.film.is_some(), workspace);
     for band in bands {
         let wanted = part.at(band).wider(MARGIN, sizes[band]);
         let rows = (wanted.wider(BLUR_RADIUS, sizes[band]).rows(), wanted.rows());
         engine.band::<N>(band, sizes[band], rows, Adapted::ToBoth, workspace);
     }
-}
-
-/// Puts bands and channels together.
-fn draw<const N: usize>(
-    sizes: &Sizes,
-    bands: Range<usize>,
-    part: Part,
-    film: bool,
-    (growth, scale): (f32, f32),
-    workspace: &mut VisionWorkspace,
-) {
-    let VisionWorkspace { differences, map, strip, .. } = workspace;
-    let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]);
-    for band in bands.clone() {
-        // The pyramid halves contrasts between its finest and its coarsest band
-        let weight = scale * if film { 1.0 } else { STILL as f32 } * if band == 0 { 1.0 } else { 0.5 };
-        for y in parts(band).rows() {
-            let Range { start, end } = parts(band).columns();
-            let here = y * sizes[band].width + start..y * sizes[band].width + end;
-            let planes: [&[f32]; N] =
-                std::array::from_fn(|channel| &differences[channel][band][here.clone()]);
-            let transient = film.then(|| &differences[TRANSIENT][band][here.clone()]);
-            across_row(planes, transient, growth, weight, &mut map[band][here]);
-        }
-    }
-    collapse(map, bands, sizes, |band| parts(band).rows(), &mut strip.narrow, &mut strip.places);
 }
 
 #[cfg(test)]
@@ -335,12 +335,18 @@ mod tests {
         [picture, residual.collect()]
     }
 
+    fn planes(pixels: &[[f32; 3]]) -> [Vec<f32>; 3] {
+        [0, 1, 2].map(|c| pixels.iter().map(|pixel| pixel[c]).collect())
+    }
+
     fn differences(
         viewing: &str,
         [picture, residual]: &[Vec<[f32; 3]>; 2],
     ) -> (VisionWorkspace, Range<usize>) {
         let (model, mut room) =
             (VisionModel::new(&viewing.parse::<Viewing>().unwrap()), VisionWorkspace::default());
+        let [picture, residual] = [picture, residual].map(|pixels| planes(pixels));
+        let [picture, residual] = [&picture, &residual].map(|planes| planes.each_ref().map(Vec::as_slice));
         let pixels = ResidualPixels::Rgb { picture, residual };
         let patch = ResidualPatch { pixels, size: (96, 64), columns: 0..96, rows: 0..64 };
         let bands = model.residual(&patch, VisionDetail::FULL, &mut room).unwrap().bands;
