@@ -256,7 +256,7 @@ pub fn rescaled(difference: f32, contrast: f32) -> f32 {
 /// What differences of each channel count for in [`VisibleDifference::contrast_energy`]. It sums over bands, of which the metric
 /// takes the mean of fourth order, and achromatic noise of single pixels is seen in two bands, chromatic in five: of
 /// [`VisionDetail::COLOUR`], four. With these weights, chosen on flat pictures, noise of any colour has lost as many JODs
-/// as grey noise of the same energy, most often within 0.05 (`docs/benchmarks/vision.md`).
+/// as grey noise of the same energy, most often within 0.05 (`docs/benchmarks/stops.md`).
 const BESIDE_ACHROMATIC: [f32; CHANNELS] = [1.0, 0.7, 0.7];
 
 /// What the two pictures have of the residual beside the middle between them.

@@ -2,7 +2,6 @@
 
 use crate::rgb::Rgb;
 use exposure::{DELTA, LogAverage, NoisyPixel};
-use multiversion::multiversion;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -292,19 +291,6 @@ impl Display {
     }
 }
 
-/// [`Display::luma`] of many pixels. The arithmetic is that of IEEE 754 with any instructions: all
-/// processors agree to the bit.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-pub(crate) fn luma_row(display: &Display, linear: &[Rgb], shown: &mut [f32]) {
-    // Few enough to stay in the nearest cache
-    const PIXELS: usize = 128;
-    let mut channels = [[0.0; PIXELS]; 3];
-    for (linear, shown) in linear.chunks(PIXELS).zip(shown.chunks_mut(PIXELS)) {
-        split_channels(linear, &mut channels);
-        luma_of_channels(display, channels.each_ref().map(|channel| &channel[..shown.len()]), shown);
-    }
-}
-
 /// The channels of pixels, each by itself, as vector instructions want them.
 ///
 /// Inlined as the next, to be compiled for the vector instructions of whoever calls it.
@@ -316,16 +302,17 @@ pub(crate) fn split_channels<const PIXELS: usize>(pixels: &[Rgb], channels: &mut
     }
 }
 
-/// [`Display::luma`] of pixels whose channels are as long as `shown`.
+/// [`Display::encode`] of pixels whose channels are all as long as the first. The arithmetic is that of IEEE 754 with any
+/// instructions: all processors agree to the bit.
 #[inline(always)]
-pub(crate) fn luma_of_channels(display: &Display, [r, g, b]: [&[f32]; 3], shown: &mut [f32]) {
-    let pixels = shown.iter_mut().zip(r).zip(g).zip(b);
+pub(crate) fn encode_channels(display: &Display, [r, g, b]: [&mut [f32]; 3]) {
+    let pixels = r.iter_mut().zip(g).zip(b);
     if let Curve::Custom(_) = display.curve {
-        pixels.for_each(|(((shown, r), g), b)| *shown = display.luma([*r, *g, *b]));
+        pixels.for_each(|((r, g), b)| [*r, *g, *b] = display.encode([*r, *g, *b]));
         return;
     }
-    for (((shown, r), g), b) in pixels {
-        *shown = luminance(display.encode_plain([*r, *g, *b]));
+    for ((r, g), b) in pixels {
+        [*r, *g, *b] = display.encode_plain([*r, *g, *b]);
     }
 }
 
@@ -418,10 +405,13 @@ mod tests {
             let curve = ToneCurve::new(b"root", |exposed| exposed.map(f32::sqrt));
             let custom = ToneMapping::Custom { exposure: 2.0, curve };
             for tone in [ToneMapping::default(), ToneMapping::Srgb { exposure: 2.0 }, custom] {
-                let (display, mut shown) = (tone.settle(&row), vec![0.0; width]);
-                luma_row(&display, &row, &mut shown);
-                let one_by_one: Vec<f32> = row.iter().map(|&pixel| display.luma(pixel)).collect();
-                assert_eq!(shown, one_by_one, "{width} pixels");
+                let display = tone.settle(&row);
+                let mut channels = [[0.0; 300]; 3];
+                split_channels(&row, &mut channels);
+                encode_channels(&display, channels.each_mut().map(|channel| &mut channel[..width]));
+                for (i, &pixel) in row.iter().enumerate() {
+                    assert_eq!(channels.map(|channel| channel[i]), display.encode(pixel), "{width} pixels");
+                }
             }
         }
     }

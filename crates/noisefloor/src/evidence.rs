@@ -1,6 +1,6 @@
 //! What a tile is judged by: its display luminance, and its noise.
 
-use crate::display::{Display, luma_of_channels, luma_row, luminance, split_channels};
+use crate::display::{Display, encode_channels, luminance, split_channels};
 use crate::film::{Film, blend, weights};
 pub use crate::plane::Plane;
 use crate::rgb::Rgb;
@@ -30,25 +30,39 @@ pub enum Evidence {
 #[derive(Default)]
 struct Buffers {
     planes: [Vec<f32>; 2],
-    shown: [Vec<f32>; 2],
+    shown: [Channels<Vec<f32>>; 2],
 }
 
 /// Pixels of a row that are worked on at a time: few enough to stay in the nearest cache.
 const PIXELS: usize = 128;
 
-/// What is made of so many pixels on the way to image and residual, each of the mean and of both halves.
+/// Display values R′, G′ and B′ of so many pixels, and their luminance Y′: of the mean of all samples, and of both halves.
 struct Scratch {
-    channels: [[[f32; PIXELS]; 3]; 3],
+    codes: [[[f32; PIXELS]; 3]; 3],
     shown: [[f32; PIXELS]; 3],
 }
 
 impl Scratch {
-    const EMPTY: Self = Self { channels: [[[0.0; PIXELS]; 3]; 3], shown: [[0.0; PIXELS]; 3] };
+    const EMPTY: Self = Self { codes: [[[0.0; PIXELS]; 3]; 3], shown: [[0.0; PIXELS]; 3] };
 }
 
 thread_local! {
     static BUFFERS: RefCell<Buffers> = RefCell::default();
 }
+
+/// Noise in R′ and B′ beside what it would be in the colour of the picture, over the strongest in Y′, from which on it counts as
+/// strongly coloured. Lamps of 2500 K on grey have 0.7 of B′, dots of green 0.8 to 1, of which greys still tell what they cost
+/// within 0.05 JOD; dots of red have 3.7, of blue 12.
+const OTHER_COLOUR: f32 = 0.95;
+/// Noise in R′ − Y′ and in B′ − Y′, over the strongest in Y′, from which on it counts as strongly coloured even in the colour of
+/// the picture. At these, the contrast in units of the vision model's threshold is below that of Y′ in all bands from one cycle
+/// per degree on, and two thirds of it in the finer ones, where noise of single pixels is seen.
+const SATURATED: [f32; 2] = [3.5, 4.2];
+/// What nobody sees of it: a step of eight bits. At ten cycles per degree and fewer, the eye is four to ten times as sensitive
+/// to Y′ as to either.
+const UNSEEN: f32 = 1.0 / 255.0;
+/// Edge of the squares in which noise is looked at for its colour: of a window, a lone dot has a third or more.
+const SQUARE: usize = 16;
 
 /// Two pictures of a tile as displayed, and what they differ by. All planes are display-encoded and have the same shape
 /// (rows, columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around
@@ -68,20 +82,53 @@ pub struct TilePlanes {
     pub rounding: f32,
     /// On which display the picture is seen, and from how far: the default, unless changed.
     pub viewing: Viewing,
+    /// The same in R′, G′ and B′, where noise is so strongly coloured that greys do not tell how visible it is.
+    pub colour: Option<ColourPlanes>,
     /// The tile itself within the planes: rows and columns of the planes that belong to it.
     pub inner: Tile,
     /// The tile in its picture.
     pub place: Tile,
 }
 
+/// Planes of R′, G′ and B′, as large as those of the [`TilePlanes`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColourPlanes {
+    /// The middle between the two pictures.
+    pub image: [Plane; 3],
+    /// What they differ by.
+    pub residual: [Plane; 3],
+}
+
+impl ColourPlanes {
+    /// Squares of the residual, summed over channels.
+    pub(crate) fn energy(&self) -> Plane {
+        let [red, green, blue] = self.residual.each_ref().map(Plane::values);
+        let pixels = red.iter().zip(green).zip(blue);
+        Plane::new(self.residual[0].size(), pixels.map(|((r, g), b)| r * r + g * g + b * b).collect())
+    }
+}
+
+/// R′, G′ and B′ from Y′, R′ and B′.
+fn with_green(luma: &Plane, red: Plane, blue: Plane) -> [Plane; 3] {
+    let [of_red, of_green, of_blue] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(luminance);
+    let red_and_blue = red.values().iter().zip(blue.values());
+    let green = luma.values().iter().zip(red_and_blue);
+    let green = green.map(|(luma, (r, b))| (luma - of_red * r - of_blue * b) * (1.0 / of_green)).collect();
+    let green = Plane::new(luma.size(), green);
+    [red, green, blue]
+}
+
 impl TilePlanes {
     /// Collects the planes of a tile of an image of `width`×`height` pixels, both at least 1; `pixel(x, y)`
     /// gives the display-encoded picture and its residual at image coordinates.
     pub fn gather(size: (usize, usize), tile: Tile, pixel: impl Fn(usize, usize) -> (Rgb, Rgb)) -> Self {
-        let shown = Shown::of_rows(size, &[tile], |y, columns, image, residual| {
-            for (x, (image, residual)) in columns.zip(image.iter_mut().zip(residual)) {
-                let (shown, noise) = pixel(x, y);
-                (*image, *residual) = (luminance(shown), luminance(noise));
+        let shown = Shown::of_rows(size, &[tile], |y, columns, mut row| {
+            for (i, x) in columns.enumerate() {
+                let (image, residual) = pixel(x, y);
+                for (of, pixel) in [image, residual].into_iter().enumerate() {
+                    let numbers = [luminance(pixel), pixel[0], pixel[2]];
+                    row[of].iter_mut().zip(numbers).for_each(|(plane, number)| plane[i] = number);
+                }
             }
         });
         shown.into_planes(tile)
@@ -92,7 +139,10 @@ impl TilePlanes {
     /// 0 without noise. An energy of noise that is estimated from one residual for each pixel has a relative
     /// variance of about 1/(share·N).
     pub(crate) fn noise_spread(&self) -> f32 {
-        let [squares, fourths] = self.residual.sums_inside(self.inner, |r| [r * r, (r * r) * (r * r)]);
+        let [squares, fourths] = match &self.colour {
+            None => self.residual.sums_inside(self.inner, |r| [r * r, (r * r) * (r * r)]),
+            Some(colour) => colour.energy().sums_inside(self.inner, |square| [square, square * square]),
+        };
         if fourths > 0.0 { (squares * squares / (fourths * self.inner.pixels() as f64)) as f32 } else { 0.0 }
     }
 
@@ -128,10 +178,10 @@ impl TilePlanes {
     ) -> Self {
         let weights = weights(renderings.map(|rendering| rendering.spp));
         let mut scratch = Scratch::EMPTY;
-        let shown = Shown::of_rows((width, height), &[tile], |y, columns, image, residual| {
-            let row = y * width + columns.start..y * width + columns.end;
-            let halves = renderings.map(|rendering| &rendering.pixels[row.clone()]);
-            halves_row(display, halves, weights, image, residual, &mut scratch);
+        let shown = Shown::of_rows((width, height), &[tile], |y, columns, row| {
+            let here = y * width + columns.start..y * width + columns.end;
+            let halves = renderings.map(|rendering| &rendering.pixels[here.clone()]);
+            halves_row(display, halves, weights, row, &mut scratch);
         });
         let planes = shown.into_planes(tile);
         let [a, b] = renderings.map(|rendering| rendering.rounding);
@@ -151,13 +201,11 @@ impl TilePlanes {
         samples: Samples,
     ) -> Option<Self> {
         let scale = residual_scale(image.spp, other.spp, samples)?;
-        let shown = Shown::of_rows((width, height), &[tile], |y, columns, shown, residual| {
-            let row = y * width + columns.start..y * width + columns.end;
-            luma_row(display, &image.pixels[row.clone()], shown);
-            luma_row(display, &other.pixels[row], residual);
-            for (a, b) in shown.iter_mut().zip(residual) {
-                (*a, *b) = (0.5 * (*a + *b), (*a - *b) * scale);
-            }
+        let mut scratch = Scratch::EMPTY;
+        let shown = Shown::of_rows((width, height), &[tile], |y, columns, row| {
+            let here = y * width + columns.start..y * width + columns.end;
+            let pair = [image, other].map(|rendering| &rendering.pixels[here.clone()]);
+            pair_row(display, pair, scale, row, &mut scratch);
         });
         let planes = shown.into_planes(tile);
         Some(Self { rounding: (image.rounding + other.rounding) * scale * scale, ..planes })
@@ -169,51 +217,159 @@ impl TilePlanes {
     /// If `reference` has fewer pixels than the film.
     pub fn from_reference(film: &Film, display: &Display, reference: &[Rgb], tile: Tile) -> Self {
         let grid = film.grid();
-        let shown = Shown::of_rows(grid.size(), &[tile], |y, columns, image, residual| {
-            for (x, (image, residual)) in columns.zip(image.iter_mut().zip(residual)) {
-                let pixel = y * grid.width() + x;
-                let shown = display.luma(film.pixel(tile.owner(grid, x, y), pixel));
-                let reference = luminance(reference[pixel]);
-                (*image, *residual) = (0.5 * (shown + reference), shown - reference);
-            }
-        });
-        shown.into_planes(tile)
+        Self::gather(grid.size(), tile, |x, y| {
+            let pixel = y * grid.width() + x;
+            let shown = display.encode(film.pixel(tile.owner(grid, x, y), pixel));
+            middle_and_difference(shown, reference[pixel], 1.0)
+        })
     }
 }
 
-/// Image and residual of tiles beside each other in a row of the grid, each pixel worked out once for all of them, with
-/// the halos.
-pub(crate) struct Shown {
-    size: (usize, usize),
-    /// Pixels of the picture that are there.
-    rows: Range<usize>,
-    columns: Range<usize>,
-    image: Vec<f32>,
-    residual: Vec<f32>,
+/// What lies in the middle between two pixels, and what they differ by, times `scale`.
+#[inline(always)]
+pub(crate) fn middle_and_difference(a: Rgb, b: Rgb, scale: f32) -> (Rgb, Rgb) {
+    (std::array::from_fn(|c| 0.5 * (a[c] + b[c])), std::array::from_fn(|c| (a[c] - b[c]) * scale))
 }
 
-impl Shown {
-    /// What `row(y, columns, image, residual)` makes of each row of the picture. `tiles` are beside each other.
-    fn of_rows(
-        size: (usize, usize),
-        tiles: &[Tile],
-        mut row: impl FnMut(usize, Range<usize>, &mut [f32], &mut [f32]),
-    ) -> Self {
+/// Y′, R′ and B′ of pixels, as far as a plane or a row has them: G′ follows.
+type Channels<T> = [T; 3];
+/// Where a row of pixels of the image goes, and of the residual.
+type Row<'a> = [Channels<&'a mut [f32]>; 2];
+
+/// Some pixels of a row.
+fn part<'a>(row: &'a mut Row<'_>, pixels: Range<usize>) -> Row<'a> {
+    row.each_mut().map(|channels| channels.each_mut().map(|plane| &mut plane[pixels.clone()]))
+}
+
+/// The squared noise of a pixel from Y′, R′ and B′: as far as it is coloured, in units in which more than grey noise is strongly
+/// coloured, and as greys.
+#[inline(always)]
+fn tint([luma, r, b]: Channels<f32>, [noise, noise_r, noise_b]: Channels<f32>) -> [f32; 2] {
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    // Noise in the colour of the picture has one ratio to all channels
+    let ratio = noise / larger(luma, UNSEEN);
+    let other = larger((noise_r - r * ratio).abs(), (noise_b - b * ratio).abs()) * (1.0 / OTHER_COLOUR);
+    let [from_r, from_b] = SATURATED.map(|limit| 1.0 / limit);
+    let saturated = larger((noise_r - noise).abs() * from_r, (noise_b - noise).abs() * from_b);
+    let coloured = larger(other, saturated);
+    [coloured * coloured, noise * noise]
+}
+
+/// Adds the [`tint`] of the pixels of a row to the sums of their columns, and the squares of it.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn add_tints(image: Channels<&[f32]>, residual: Channels<&[f32]>, sums: &mut [Vec<f32>; 4]) {
+    let [coloured, grey, coloured_squares, grey_squares] = sums.each_mut().map(Vec::as_mut_slice);
+    let n = coloured.len();
+    let (grey, coloured_squares, grey_squares) =
+        (&mut grey[..n], &mut coloured_squares[..n], &mut grey_squares[..n]);
+    let ([luma, r, b], [noise, noise_r, noise_b]) = (image, residual);
+    let (luma, r, b) = (&luma[..n], &r[..n], &b[..n]);
+    let (noise, noise_r, noise_b) = (&noise[..n], &noise_r[..n], &noise_b[..n]);
+    for i in 0..n {
+        let [of_colour, of_grey] = tint([luma[i], r[i], b[i]], [noise[i], noise_r[i], noise_b[i]]);
+        coloured[i] += of_colour;
+        grey[i] += of_grey;
+        coloured_squares[i] += of_colour * of_colour;
+        grey_squares[i] += of_grey * of_grey;
+    }
+}
+
+/// Pixels of the picture that planes with their halos show, each of which is worked out once.
+struct Region {
+    size: (usize, usize),
+    rows: Range<usize>,
+    columns: Range<usize>,
+}
+
+impl Region {
+    /// Of tiles beside each other.
+    fn new(size: (usize, usize), tiles: &[Tile]) -> Self {
         let (width, height) = size;
         let rows = reach(tiles[0].y, tiles[0].height, height);
         let of_tiles = || tiles.iter().map(|tile| reach(tile.x, tile.width, width));
         let columns = of_tiles().fold(of_tiles().next().unwrap_or_default(), |all, reach| {
             all.start.min(reach.start)..all.end.max(reach.end)
         });
-        let [mut image, mut residual] = BUFFERS.with_borrow_mut(|buffers| std::mem::take(&mut buffers.shown));
-        let pixels = rows.len() * columns.len();
-        image.resize(pixels, 0.0);
-        residual.resize(pixels, 0.0);
-        let both = image.chunks_exact_mut(columns.len()).zip(residual.chunks_exact_mut(columns.len()));
-        for (y, (image, residual)) in rows.clone().zip(both) {
-            row(y, columns.clone(), image, residual);
+        Self { size, rows, columns }
+    }
+
+    fn pixels(&self) -> usize {
+        self.rows.len() * self.columns.len()
+    }
+
+    /// The plane of one of the tiles, from the pixels of the region; returns its rows and columns.
+    fn pad<T: Copy>(&self, tile: Tile, shown: &[T], plane: &mut Vec<T>) -> (usize, usize) {
+        let padded = |edge: usize| edge.next_multiple_of(HALO) + 2 * HALO;
+        let (rows, columns) = (padded(tile.height), padded(tile.width));
+        let (width, height) = self.size;
+        // Columns of the plane that show the picture and no mirror image of it
+        let inside = HALO.saturating_sub(tile.x)..(width + HALO - tile.x).min(columns);
+        let first = tile.x + inside.start - HALO - self.columns.start;
+        plane.resize(rows * columns, shown[0]);
+        for (place, row) in plane.chunks_exact_mut(columns).enumerate() {
+            let y = mirror(tile.y + place, height) - self.rows.start;
+            let shown = &shown[y * self.columns.len()..][..self.columns.len()];
+            row[inside.clone()].copy_from_slice(&shown[first..][..inside.len()]);
+            for i in (0..inside.start).chain(inside.end..columns) {
+                row[i] = shown[mirror(tile.x + i, width) - self.columns.start];
+            }
         }
-        Self { size, rows, columns, image, residual }
+        (rows, columns)
+    }
+}
+
+/// Image and residual of tiles beside each other in a row of the grid.
+pub(crate) struct Shown {
+    region: Region,
+    planes: [Channels<Vec<f32>>; 2],
+}
+
+impl Shown {
+    /// What `row(y, columns, to)` makes of each row of the picture. `tiles` are beside each other.
+    fn of_rows(
+        size: (usize, usize),
+        tiles: &[Tile],
+        mut row: impl FnMut(usize, Range<usize>, Row<'_>),
+    ) -> Self {
+        let region = Region::new(size, tiles);
+        let mut planes = BUFFERS.with_borrow_mut(|buffers| std::mem::take(&mut buffers.shown));
+        planes.as_flattened_mut().iter_mut().for_each(|plane| plane.resize(region.pixels(), 0.0));
+        let width = region.columns.len();
+        for (n, y) in region.rows.clone().enumerate() {
+            let to = planes
+                .each_mut()
+                .map(|channels| channels.each_mut().map(|plane| &mut plane[n * width..][..width]));
+            row(y, region.columns.clone(), to);
+        }
+        Self { region, planes }
+    }
+
+    /// Whether the coloured noise of some square of a tile is stronger than the grey noise of all, by the root mean square or by
+    /// that of fourth order, as the worst window is judged, and seen.
+    fn is_coloured(&self, tile: Tile) -> bool {
+        let Region { rows, columns, .. } = &self.region;
+        let (top, left) = (tile.y - rows.start, tile.x - columns.start);
+        let mut sums: [Vec<f32>; 4] = std::array::from_fn(|_| vec![0.0; tile.width]);
+        let mut most = [0.0f32; 4];
+        for y in (top..top + tile.height).step_by(SQUARE) {
+            let bottom = (y + SQUARE).min(top + tile.height);
+            sums.iter_mut().for_each(|sums| sums.fill(0.0));
+            for row in y..bottom {
+                let here = row * columns.len() + left..row * columns.len() + left + tile.width;
+                let [image, residual] = self
+                    .planes
+                    .each_ref()
+                    .map(|channels| channels.each_ref().map(|plane| &plane[here.clone()]));
+                add_tints(image, residual, &mut sums);
+            }
+            for (most, sums) in most.iter_mut().zip(&sums) {
+                let mean = |square: &[f32]| square.iter().sum::<f32>() / (square.len() * (bottom - y)) as f32;
+                *most = sums.chunks(SQUARE).map(mean).fold(*most, f32::max);
+            }
+        }
+        let [coloured, grey, coloured_squares, grey_squares] = most;
+        let unseen = UNSEEN * UNSEEN;
+        coloured > grey + unseen || coloured_squares > grey_squares + unseen * unseen
     }
 
     /// That of [`TilePlanes::from_halves`].
@@ -223,7 +379,7 @@ impl Shown {
         // pixel where some were kept out
         let mut runs: Vec<(Range<usize>, [u64; 2])> = Vec::with_capacity(tiles.len() + 2);
         let (mut row_of_runs, mut scratch) = (None, Scratch::EMPTY);
-        Self::of_rows(grid.size(), tiles, |y, columns, image, residual| {
+        Self::of_rows(grid.size(), tiles, |y, columns, mut row| {
             let row_of_tiles = grid.index_at(0, y);
             if film.rejected() > 0 || row_of_runs != Some(row_of_tiles) {
                 row_of_runs = Some(row_of_tiles);
@@ -238,18 +394,17 @@ impl Shown {
             }
             let halves = [0, 1].map(|half| film.half_row(half, y));
             for (run, counts) in &runs {
-                let here = run.start - columns.start..run.end - columns.start;
-                let (image, residual) = (&mut image[here.clone()], &mut residual[here]);
+                let to = part(&mut row, run.start - columns.start..run.end - columns.start);
                 match halves {
                     [Some(a), Some(b)] => {
                         let halves = [&a[run.clone()], &b[run.clone()]];
                         let weights = weights(counts.map(|n| n as f64));
-                        halves_row(display, halves, weights, image, residual, &mut scratch);
+                        halves_row(display, halves, weights, to, &mut scratch);
                     }
                     // One half alone gives no evidence
                     [a, _] => {
-                        luma_row(display, &a.unwrap_or_default()[run.clone()], image);
-                        residual.fill(0.0);
+                        let one = &a.unwrap_or_default()[run.clone()];
+                        pair_row(display, [one; 2], 0.0, to, &mut scratch);
                     }
                 }
             }
@@ -258,27 +413,26 @@ impl Shown {
 
     /// The planes of one of the tiles.
     pub(crate) fn planes(&self, tile: Tile) -> TilePlanes {
-        let padded = |edge: usize| edge.next_multiple_of(HALO) + 2 * HALO;
-        let (rows, columns) = (padded(tile.height), padded(tile.width));
-        let (width, height) = self.size;
-        let mut planes = BUFFERS.with_borrow_mut(|buffers| std::mem::take(&mut buffers.planes));
-        // Columns of the plane that show the picture and no mirror image of it
-        let inside = HALO.saturating_sub(tile.x)..(width + HALO - tile.x).min(columns);
-        let first = tile.x + inside.start - HALO - self.columns.start;
-        for (plane, shown) in planes.iter_mut().zip([&self.image, &self.residual]) {
-            plane.resize(rows * columns, 0.0);
-            for (place, row) in plane.chunks_exact_mut(columns).enumerate() {
-                let y = mirror(tile.y + place, height) - self.rows.start;
-                let shown = &shown[y * self.columns.len()..][..self.columns.len()];
-                row[inside.clone()].copy_from_slice(&shown[first..][..inside.len()]);
-                for i in (0..inside.start).chain(inside.end..columns) {
-                    row[i] = shown[mirror(tile.x + i, width) - self.columns.start];
-                }
+        let greys = BUFFERS.with_borrow_mut(|buffers| std::mem::take(&mut buffers.planes));
+        let padded = |channel: usize, planes: [Vec<f32>; 2]| {
+            let mut of = self.planes.iter();
+            planes.map(|mut plane| {
+                let size = of.next().map(|from| self.region.pad(tile, &from[channel], &mut plane));
+                Plane::new(size.unwrap_or_default(), plane)
+            })
+        };
+        let [image, residual] = padded(0, greys);
+        let colour = self.is_coloured(tile).then(|| {
+            let [red, blue] = [1, 2].map(|channel| padded(channel, Default::default()));
+            let [red_image, red_residual] = red;
+            let [blue_image, blue_residual] = blue;
+            ColourPlanes {
+                image: with_green(&image, red_image, blue_image),
+                residual: with_green(&residual, red_residual, blue_residual),
             }
-        }
-        let [image, residual] = planes.map(|values| Plane::new((rows, columns), values));
+        });
         let inner = Tile { x: HALO, y: HALO, ..tile };
-        TilePlanes { image, residual, rounding: 0.0, viewing: Viewing::default(), inner, place: tile }
+        TilePlanes { image, residual, rounding: 0.0, viewing: Viewing::default(), colour, inner, place: tile }
     }
 
     fn into_planes(self, tile: Tile) -> TilePlanes {
@@ -289,7 +443,7 @@ impl Shown {
 
     /// Returns its memory to this thread's buffers.
     pub(crate) fn recycle(self) {
-        BUFFERS.with_borrow_mut(|buffers| buffers.shown = [self.image, self.residual]);
+        BUFFERS.with_borrow_mut(|buffers| buffers.shown = self.planes);
     }
 }
 
@@ -300,20 +454,20 @@ fn reach(from: usize, count: usize, edge: usize) -> Range<usize> {
     least..places().max().unwrap_or(0) + 1
 }
 
-/// Image and residual of a row of pixels from both halves, by their weights in the mean of all samples. A verdict spends
+/// Image and residual of a row of pixels from both halves, each channel by itself, by their weights in the mean of all samples. A verdict spends
 /// most of its time here and in the vision model: all of it in vector instructions, and in the nearest cache.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
 fn halves_row(
     display: &Display,
     halves: [&[Rgb]; 2],
     weights: [f32; 2],
-    image: &mut [f32],
-    residual: &mut [f32],
-    Scratch { channels, shown }: &mut Scratch,
+    mut row: Row<'_>,
+    Scratch { codes, shown }: &mut Scratch,
 ) {
-    for from in (0..image.len()).step_by(PIXELS) {
-        let n = PIXELS.min(image.len() - from);
-        let [mean, a, b] = &mut *channels;
+    let [[width, ..], _] = row.each_ref().map(|channels| channels.each_ref().map(|plane| plane.len()));
+    for from in (0..width).step_by(PIXELS) {
+        let n = PIXELS.min(width - from);
+        let [mean, a, b] = &mut *codes;
         split_channels(&halves[0][from..][..n], a);
         split_channels(&halves[1][from..][..n], b);
         for ((mean, a), b) in mean.iter_mut().zip(&*a).zip(&*b) {
@@ -321,14 +475,57 @@ fn halves_row(
                 *mean = blend([a, b], weights);
             }
         }
-        for (channels, shown) in channels.iter().zip(&mut *shown) {
-            luma_of_channels(display, channels.each_ref().map(|channel| &channel[..n]), &mut shown[..n]);
+        show(display, codes, shown, n);
+        let [image, residual] = &mut row;
+        let of_channels =
+            [shown.each_ref(), codes.each_ref().map(|of| &of[0]), codes.each_ref().map(|of| &of[2])];
+        for ((image, residual), [mean, a, b]) in image.iter_mut().zip(residual).zip(of_channels) {
+            let (mean, a, b) = (&mean[..n], &a[..n], &b[..n]);
+            let (image, residual) = (&mut image[from..][..n], &mut residual[from..][..n]);
+            for i in 0..n {
+                [image[i], residual[i]] = of_mean([mean[i], a[i], b[i]], weights);
+            }
         }
-        let [mean, a, b] = &*shown;
-        let (mean, a, b) = (&mean[..n], &a[..n], &b[..n]);
-        let (image, residual) = (&mut image[from..][..n], &mut residual[from..][..n]);
-        for i in 0..n {
-            [image[i], residual[i]] = of_mean([mean[i], a[i], b[i]], weights);
+    }
+}
+
+/// Middle and difference, times `scale`, of a row of pixels of two pictures.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+fn pair_row(
+    display: &Display,
+    pair: [&[Rgb]; 2],
+    scale: f32,
+    mut row: Row<'_>,
+    Scratch { codes, shown }: &mut Scratch,
+) {
+    let [[width, ..], _] = row.each_ref().map(|channels| channels.each_ref().map(|plane| plane.len()));
+    for from in (0..width).step_by(PIXELS) {
+        let n = PIXELS.min(width - from);
+        for (picture, codes) in pair.into_iter().zip(&mut codes[1..]) {
+            split_channels(&picture[from..][..n], codes);
+        }
+        show(display, &mut codes[1..], &mut shown[1..], n);
+        let [image, residual] = &mut row;
+        let of_channels =
+            [shown.each_ref(), codes.each_ref().map(|of| &of[0]), codes.each_ref().map(|of| &of[2])];
+        for ((image, residual), [_, a, b]) in image.iter_mut().zip(residual).zip(of_channels) {
+            let (a, b) = (&a[..n], &b[..n]);
+            let (image, residual) = (&mut image[from..][..n], &mut residual[from..][..n]);
+            for i in 0..n {
+                (image[i], residual[i]) = (0.5 * (a[i] + b[i]), (a[i] - b[i]) * scale);
+            }
+        }
+    }
+}
+
+/// Replaces linear light of pictures by display values, and adds their luminances Y′.
+#[inline(always)]
+fn show(display: &Display, codes: &mut [[[f32; PIXELS]; 3]], shown: &mut [[f32; PIXELS]], n: usize) {
+    for (codes, shown) in codes.iter_mut().zip(shown) {
+        encode_channels(display, codes.each_mut().map(|channel| &mut channel[..n]));
+        let [r, g, b] = &*codes;
+        for (((shown, r), g), b) in shown[..n].iter_mut().zip(r).zip(g).zip(b) {
+            *shown = luminance([*r, *g, *b]);
         }
     }
 }
@@ -456,6 +653,61 @@ mod tests {
         // A half without samples is no evidence, and neither are halves that are alike
         assert_eq!(of_mean([0.4, 0.4, 0.0], [1.0, 0.0]), [0.4, 0.0]);
         assert_eq!(of_mean([0.4, 0.4, 0.4], [0.3, 0.7]), [0.4, 0.0]);
+    }
+
+    /// Greys are enough for noise without colour, for noise in the colour of a wall, and for what nobody sees; not for dots of
+    /// one colour. Halves that are exchanged have the same planes, with the other sign.
+    #[test]
+    fn colour_is_looked_at_where_noise_is_coloured() {
+        let grid = TileGrid::new(80, 48, 40).unwrap();
+        let planes = |wall: Rgb, colour: Rgb, strength: f32, exchanged: bool| {
+            let mut noise = Noise::new(9);
+            let mut halves = [0, 1].map(|_| {
+                let dot = |x: usize| if x % 80 < 40 && noise.uniform() < 0.02 { strength } else { 0.0 };
+                let pixel = |dot: f32| std::array::from_fn(|c| wall[c] + dot * colour[c]);
+                (0..80 * 48).map(dot).map(pixel).collect::<Vec<Rgb>>()
+            });
+            if exchanged {
+                halves.swap(0, 1);
+            }
+            let mut film = Film::new(grid);
+            for half in &halves {
+                for tile in grid.tiles() {
+                    let batch: Vec<Rgb> = tile.rows(80).flatten().map(|i| half[i]).collect();
+                    film.add(tile.index, 10, &batch).unwrap();
+                }
+            }
+            [0, 1].map(|tile| TilePlanes::from_halves(&film, &Display::SRGB, grid.tile(tile)))
+        };
+        let (grey, red) = ([0.2; 3], [0.3, 0.06, 0.04]);
+        let in_colour = |wall, colour, strength| -> [bool; 2] {
+            planes(wall, colour, strength, false).map(|planes| planes.colour.is_some())
+        };
+        assert_eq!(in_colour(grey, [1.0; 3], 0.1), [false; 2]);
+        assert_eq!(in_colour(red, red, 0.5), [false; 2]);
+        assert_eq!(in_colour(grey, [0.0, 0.0, 1.0], 0.001), [false; 2]);
+        for colour in [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]] {
+            assert_eq!(in_colour(grey, colour, 0.1), [true, false], "{colour:?}");
+        }
+        let [one, other] = [false, true].map(|exchanged| planes(grey, [0.0, 0.3, 1.0], 4.0, exchanged));
+        let [one, other] = [&one[0], &other[0]].map(|planes| planes.colour.as_ref().unwrap());
+        assert_eq!(one.image, other.image);
+        for (one, other) in one.residual.iter().zip(&other.residual) {
+            assert!(one.values().iter().zip(other.values()).all(|(one, other)| *one == -other));
+        }
+        // What is shown, and by what it differs
+        let pixel = |planes: &[Plane; 3], place| planes.each_ref().map(|plane| plane[place]);
+        let wall = Display::SRGB.encode(grey);
+        let dots = (0..56).flat_map(|y| (0..56).map(move |x| (y, x)));
+        let dots = dots.filter(|&place| pixel(&one.residual, place)[2].abs() > 0.3);
+        assert!(dots.clone().count() > 20);
+        for place in dots {
+            let (middle, residual) = (pixel(&one.image, place), pixel(&one.residual, place));
+            // Of what is white in the mean, too, all is seen
+            assert!((residual[2].abs() - (1.0 - wall[2])).abs() < 1e-3, "{residual:?}");
+            assert!((middle[2] - 0.5 * (1.0 + wall[2])).abs() < 1e-3, "{middle:?}");
+            assert!(residual[0].abs() < 2e-3 && residual[1] * residual[2] > 0.0, "{residual:?}");
+        }
     }
 
     #[test]

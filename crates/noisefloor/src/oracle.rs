@@ -375,11 +375,16 @@ impl Oracle {
         // Either sign of the difference of the halves is as good, and light has one: that which does not hang on which
         // half is which
         let sum: f64 = planes.residual.values().iter().map(|&r| f64::from(r)).sum();
-        if sum < 0.0 {
-            planes.residual.values_mut().iter_mut().for_each(|r| *r = -*r);
-        }
+        let sign = if sum < 0.0 { -1.0 } else { 1.0 };
+        let lit = |r: &mut f32, light: f32| *r = sign * *r + light;
         let residual = planes.residual.values_mut().iter_mut();
-        residual.zip(light.residual.values()).for_each(|(r, light)| *r += light);
+        residual.zip(light.residual.values()).for_each(|(r, light)| lit(r, *light));
+        if let Some(colour) = &mut planes.colour {
+            for plane in &mut colour.residual {
+                let residual = plane.values_mut().iter_mut().zip(light.residual.values());
+                residual.for_each(|(r, light)| lit(r, *light));
+            }
+        }
         light.recycle();
         let described = self.describe_tile(&planes, spp);
         planes.recycle();

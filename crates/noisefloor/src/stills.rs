@@ -5,7 +5,7 @@ use crate::descriptor::Described;
 use crate::display::exposure::{self, NoisyPixel};
 use crate::display::{Display, ToneMapping, luminance};
 pub use crate::evidence::{Evidence, Samples};
-use crate::evidence::{Rendering, TilePlanes, residual_scale};
+use crate::evidence::{Rendering, TilePlanes, middle_and_difference, residual_scale};
 use crate::film::Film;
 use crate::nested::shared_samples;
 use crate::oracle::{Judged, Oracle};
@@ -468,7 +468,7 @@ impl<'a> SnapshotPair<'a> {
                 let at = |x: usize, y: usize| y * size.0 + x;
                 let planes = TilePlanes::gather(size, tile, |x, y| {
                     let [a, b] = [image, &**other].map(|still| display.encode(still.pixels[at(x, y)]));
-                    (std::array::from_fn(|c| 0.5 * (a[c] + b[c])), std::array::from_fn(|c| a[c] - b[c]))
+                    middle_and_difference(a, b, 1.0)
                 });
                 Ok(TilePlanes { rounding: image.rounding + other.rounding, ..planes })
             }

@@ -23,7 +23,7 @@ use super::texture::texture_energy;
 use super::windows::{BLOCK, PictureContrast, WindowContrast, block_count, block_sums};
 use crate::descriptor::NoiseMask;
 use crate::display::ROUNDING_LUMINANCE;
-use crate::evidence::{Plane, TilePlanes};
+use crate::evidence::{ColourPlanes, Plane, TilePlanes};
 use noisefloor_vision::{
     ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel, VisionWorkspace,
 };
@@ -304,23 +304,40 @@ fn with_differences<T>(
         let (rows, columns) = planes.image.size();
         let [picture, residual] = [&planes.image, &planes.residual].map(Plane::values);
         let t = planes.inner;
+        let (pixels, detail) = match &planes.colour {
+            None => (ResidualPixels::Grey { picture, residual }, VisionDetail::FAST),
+            Some(ColourPlanes { image, residual }) => {
+                let [picture, residual] =
+                    [image, residual].map(|planes| planes.each_ref().map(Plane::values));
+                (ResidualPixels::Rgb { picture, residual }, VisionDetail::COLOUR)
+            }
+        };
         let patch = ResidualPatch {
-            pixels: ResidualPixels::Grey { picture, residual },
+            pixels,
             size: (columns, rows),
             columns: t.x..t.x + t.width,
             rows: t.y..t.y + t.height,
         };
-        model.residual(&patch, VisionDetail::FAST, workspace).ok().as_mut().map(use_them)
+        model.residual(&patch, detail, workspace).ok().as_mut().map(use_them)
     })
 }
 
 /// The share of the amplitude of the residual that is not known rounding noise.
 fn without_rounding(planes: &TilePlanes) -> f64 {
-    let known = f64::from(planes.rounding * ROUNDING_LUMINANCE);
-    if known == 0.0 {
+    let rounding = f64::from(planes.rounding);
+    if rounding == 0.0 {
         return 1.0;
     }
-    let [squares] = planes.residual.sums_inside(planes.inner, |v| [v * v]);
+    let (known, squares) = match &planes.colour {
+        None => {
+            let [squares] = planes.residual.sums_inside(planes.inner, |v| [v * v]);
+            (rounding * f64::from(ROUNDING_LUMINANCE), squares)
+        }
+        Some(colour) => {
+            let [squares] = colour.energy().sums_inside(planes.inner, |square| [square]);
+            (3.0 * rounding, squares)
+        }
+    };
     (1.0 - known * planes.inner.pixels() as f64 / squares.max(f64::MIN_POSITIVE)).max(0.0).sqrt()
 }
 

@@ -7,7 +7,7 @@ use crate::params::Audience;
 use crate::rgb::Rgb;
 use crate::svm::{Machine, Scaler, Svm};
 use noisefloor_testkit::Noise;
-use noisefloor_vision::Viewing;
+use noisefloor_vision::{Viewing, VisionModel, VisionWorkspace};
 use std::collections::BTreeMap;
 
 /// A film of 64×64 pixels with `samples` samples of standard deviation `sigma` around grey.
@@ -53,6 +53,53 @@ fn more_samples_are_less_visible_and_the_expected_need_is_near() {
     let there = judge(&mut oracle, &film(expected, 0.5), None).unwrap().probability.unwrap();
     assert!((0.9..0.98).contains(&there), "{expected}: {there}");
     assert_eq!(many.expected_spp, Some(100_000));
+}
+
+/// Where dots of one colour are as strong as tiles can stop with, they have cost as many JODs as grey ones are where these
+/// stop, by the whole metric, within 0.05.
+#[cfg(feature = "bundled-model")]
+#[test]
+fn noise_of_any_colour_stops_where_it_has_lost_as_much() {
+    const EDGE: usize = 64;
+    let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
+    let display = Display::SRGB;
+    let mut lost_at_the_stop = |colour: Rgb| {
+        let mean_of = |film: &Film| -> Vec<Rgb> {
+            (0..EDGE * EDGE).map(|i| display.encode(film.pixel(0, i))).collect()
+        };
+        let film = |strength: f32| {
+            let (mut film, mut noise) = (Film::new(TileGrid::new(EDGE, EDGE, EDGE).unwrap()), Noise::new(5));
+            for _ in 0..2 {
+                let pixel = |dot: bool| colour.map(|c| if dot { 0.2 + strength * c } else { 0.2 }.max(0.0));
+                let half: Vec<Rgb> = (0..EDGE * EDGE).map(|_| pixel(noise.uniform() < 0.01)).collect();
+                film.add(0, 1000, &half).unwrap();
+            }
+            film
+        };
+        let (mut low, mut high) = (0.01f32, 10.0f32);
+        while high / low > 1.02 {
+            let middle = (low * high).sqrt();
+            let stops = judge(&mut Oracle::bundled(), &film(middle), None).unwrap().converged;
+            if stops { low = middle } else { high = middle }
+        }
+        let wall = vec![display.encode([0.2; 3]); EDGE * EDGE];
+        10.0 - eyes.compare(&mean_of(&film(low)), &wall, (EDGE, EDGE), &mut room).unwrap().jod()
+    };
+    let grey = lost_at_the_stop([1.0; 3]);
+    assert!((0.3..0.42).contains(&grey), "{grey}");
+    // The last two have no luminance
+    for colour in [
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [1.0, -0.297, 0.0],
+        [0.0, -0.101, 1.0],
+    ] {
+        let lost = lost_at_the_stop(colour);
+        assert!((lost - grey).abs() < 0.05, "{colour:?}: {lost}, grey: {grey}");
+    }
 }
 
 #[cfg(feature = "bundled-model")]
