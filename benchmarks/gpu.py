@@ -131,6 +131,12 @@ def renderer(kind, width, height):
     return render
 
 
+def named(kind):
+    """As the ledger calls a renderer."""
+    known = {"cuda": "CUDA, 60 lines", "cornell": "Mitsuba, Cornell box", "paced": "paced"}
+    return known.get(kind) or "Mitsuba, " + os.path.basename(os.path.dirname(kind))
+
+
 def session(width, height, tile, limit):
     params = noisefloor.Params(tile=tile, max_spp=limit, schedule="growing", step=16)
     return noisefloor.Session(width, height, params=params)
@@ -227,33 +233,27 @@ def main():
     print(f"{card}; {os.cpu_count()} processors; noisefloor {noisefloor.__version__}")
     kinds, sizes = options.renderers.split(","), [tuple(map(int, size.split("x"))) for size in options.sizes.split(",")]
     renderers = {}
-    print("| renderer | pixels | render | copy | push | judge | longest | oracle : render | passes |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("### gpu-pass\n| | render | copy | push | judge | oracle : render |\n|---|---|---|---|---|---|")
     for kind, (width, height) in itertools.product(kinds, sizes):
         render = renderers[kind, width, height] = renderer(kind, width, height)
         render(PASS, 10**6)  # compiles
         judged = noisefloor.Session(width, height, params=noisefloor.Params(tile=options.tile, max_spp=options.limit))
-        (rendered, *oracle), longest, passes = parts(render, judged, options.limit)
-        cells = " | ".join(f"{number:.1f}" for number in [rendered, *oracle, longest])
-        print(f"| {kind} | {width}×{height} | {cells} | ×{sum(oracle) / rendered:.2f} | {passes} |", flush=True)
-    print()
-    print("| renderer | pixels | alone | waiting | background | waiting : alone | background : alone | beyond the stop | open |")
-    print("|---|---|---|---|---|---|---|---|---|")
+        (rendered, *oracle), longest, _ = parts(render, judged, options.limit)
+        cells = " | ".join(f"{number:.1f}" for number in [rendered, *oracle])
+        print(f"| {named(kind)}, {width}×{height} | {cells} ({longest:.0f}) | ×{sum(oracle) / rendered:.2f} |", flush=True)
+    print("\n### gpu-wall\n| | alone | a session that waits | in the background | samples beyond the stop |\n|---|---|---|---|---|")
     for (kind, width, height), render in renderers.items():
         warm = Sums(render)
         for _ in range(2):
             warm.add()
         warm.take()
         new = lambda: session(width, height, options.tile, options.limit)
-        judged = new()
-        waited, calls = waiting(render, judged)
-        # Those that had converged stopped before the limit
-        limited = sum(stop.reason != "converged" for stop in judged.stops())
+        waited, calls = waiting(render, new())
         beside, more = background(render, new())
         # Each beside as many samples without an oracle
         plain, as_many = alone(render, calls), alone(render, more)
-        print(f"| {kind} | {width}×{height} | {plain:.2f} s, {calls * AT_ONCE} spp | {waited:.2f} s | {beside:.2f} s "
-              f"| ×{waited / plain:.2f} | ×{beside / as_many:.2f} | {100 * (more / calls - 1):.1f} % | {limited} |", flush=True)
+        print(f"| {named(kind)}, {width}×{height} | {plain:.2f} s | ×{waited / plain:.2f} | ×{beside / as_many:.2f} "
+              f"| {100 * (more / calls - 1):.1f} % |", flush=True)
 
 
 if __name__ == "__main__":
