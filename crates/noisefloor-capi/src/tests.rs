@@ -11,7 +11,7 @@ use crate::session::*;
 use crate::status::*;
 use crate::tone::*;
 use crate::tune::*;
-use noisefloor::display::{ToneTable, parse_cube};
+use noisefloor::display::{ToneCurve, parse_cube};
 use noisefloor::tune::{Ending, Excess, Knob, Next, PicturePair, Tuning};
 use noisefloor::{Oracle, Params, Rgb, Session, Tile, ToneMapping, criterion::CriterionError};
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -366,7 +366,7 @@ fn tone_mappings_of_ones_own_judge_as_in_rust() {
                 0 0 0\n1 0 0\n0 1 0\n1 .9 0\n0 0 .8\n1 0 1\n0 1 1\n1 1 1\n";
     let table: Vec<f32> = (0..81).map(|i| ((i / 3 % 3) as f32 / 2.0).powf(0.5)).collect();
     let lut = parse_cube(text.as_bytes()).unwrap().into_tone_curve("log2:-6,3".parse().unwrap());
-    let made = ToneTable::new(3, 0.01, 4.0, table.as_chunks().0.to_vec()).unwrap().into_tone_curve();
+    let made = ToneCurve::of_table(3, 0.01, 4.0, table.as_chunks().0.to_vec()).unwrap();
     let mut found = Vec::new();
     for (by_cube, curve) in [(true, lut), (false, made)] {
         let mut tone = null_mut();

@@ -3,7 +3,7 @@
 use crate::border;
 use crate::handle;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::display::{LutInput, LutInputError, ToneCurve, ToneTable, ToneTableError, parse_cube};
+use noisefloor::display::{LutInput, LutInputError, ToneCurve, ToneTableError, parse_cube};
 use std::ffi::c_char;
 
 /// How radiance is displayed, for NfParams: a table, or a .cube file.
@@ -79,9 +79,8 @@ pub(crate) unsafe fn curve(
 ) -> Result<ToneCurve, Failure> {
     let wrong = |error: ToneTableError| Failure::new(NfStatus::Argument, error.to_string());
     // Before the table, whose length follows from its edge
-    ToneTable::radiances(edge, toe, top).map_err(wrong)?;
+    ToneCurve::table_radiances(edge, toe, top).map_err(wrong)?;
     // SAFETY: as for this function.
     let values = unsafe { border::array(table, floats, 3 * edge.pow(3), "table") }?;
-    let table = ToneTable::new(edge, toe, top, values.as_chunks().0.to_vec()).map_err(wrong)?;
-    Ok(table.into_tone_curve())
+    ToneCurve::of_table(edge, toe, top, values.as_chunks().0.to_vec()).map_err(wrong)
 }

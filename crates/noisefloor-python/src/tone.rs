@@ -4,7 +4,7 @@ use crate::arrays::{dtype, refuse_masked};
 use crate::errors::{ParameterError, PictureError, Raise, SizeError, file_error, whole};
 use crate::pickle::reduced;
 use noisefloor::Rgb;
-use noisefloor::display::{LutInput, LutInputError, ToneCurve, ToneTable, ToneTableError, parse_cube};
+use noisefloor::display::{LutInput, LutInputError, ToneCurve, ToneTableError, parse_cube};
 use noisefloor_image::read_cube;
 use numpy::ndarray::Array4;
 use numpy::{IntoPyArray, PyArray1, PyArray4, PyArrayMethods, PyReadonlyArray4};
@@ -18,8 +18,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// What a curve of this module was made of.
 #[derive(Clone)]
 enum Origin {
-    Table(Arc<ToneTable>),
+    Table(Arc<Table>),
     Lut(Arc<LutText>),
+}
+
+/// A table, and the range of its axes.
+struct Table {
+    edge: usize,
+    toe: f32,
+    top: f32,
+    values: Vec<Rgb>,
 }
 
 /// A `.cube` file.
@@ -62,7 +70,7 @@ pub(crate) fn made<'py>(py: Python<'py>, curve: &ToneCurve) -> PyResult<Option<B
 #[derive(Clone)]
 pub(crate) struct PyToneTable {
     pub(crate) curve: ToneCurve,
-    table: Arc<ToneTable>,
+    table: Arc<Table>,
 }
 
 impl PartialEq for PyToneTable {
@@ -106,8 +114,8 @@ impl PyToneTable {
         }
         let values: Vec<f32> = view.iter().copied().collect();
         let values: Vec<Rgb> = values.as_chunks().0.to_vec();
-        let table = Arc::new(ToneTable::new(edge, toe, top, values).map_err(raise)?);
-        let curve = ToneTable::clone(&table).into_tone_curve();
+        let curve = ToneCurve::of_table(edge, toe, top, values.clone()).map_err(raise)?;
+        let table = Arc::new(Table { edge, toe, top, values });
         keep(&curve, Origin::Table(Arc::clone(&table)));
         Ok(Self { curve, table })
     }
@@ -123,21 +131,20 @@ impl PyToneTable {
         toe: f32,
         top: f32,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        Ok(ToneTable::radiances(n, toe, top).map_err(raise)?.into_pyarray(py))
+        Ok(ToneCurve::table_radiances(n, toe, top).map_err(raise)?.into_pyarray(py))
     }
 
     fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray4<f32>>, f32, f32)> {
-        let edge = self.table.edge();
-        let values = self.table.values().as_flattened().to_vec();
+        let &Table { edge, toe, top, ref values } = &*self.table;
+        let values = values.as_flattened().to_vec();
         let array = Array4::from_shape_vec((edge, edge, edge, 3), values);
         let array = array.map_err(|error| SizeError::new_err(error.to_string()))?.into_pyarray(py);
-        let (toe, top) = self.table.range();
         Ok((array, toe, top))
     }
 
     fn __repr__(&self) -> String {
-        let ((toe, top), digest) = (self.table.range(), self.curve.digest());
-        format!("<ToneTable {} of edge {}, toe {toe}, top {top}>", &digest[..8], self.table.edge())
+        let (Table { edge, toe, top, .. }, digest) = (&*self.table, self.curve.digest());
+        format!("<ToneTable {} of edge {edge}, toe {toe}, top {top}>", &digest[..8])
     }
 }
 

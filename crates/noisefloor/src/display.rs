@@ -17,7 +17,7 @@ pub use cube::{CubeError, parse_cube};
 pub use lut::{ColourLut, LutInput, LutInputError};
 pub use srgb::{srgb_decode, srgb_encode};
 pub use tone_curve::ToneCurve;
-pub use tone_table::{ToneTable, ToneTableError};
+pub use tone_table::ToneTableError;
 
 /// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
 pub(crate) const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;

@@ -2,7 +2,7 @@
 
 use noisefloor::{
     Oracle, Params, Rgb, Session, Stop, StopReason, StoppingCriterion, ToneMapping, Verdict,
-    display::{Display, ToneCurve, ToneTable},
+    display::{Display, ToneCurve},
     tune::{Looked, PicturePair},
 };
 use noisefloor_denoise::{DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
@@ -89,7 +89,7 @@ fn tones() -> Vec<ToneMapping> {
 /// A table like AgX: a curve of the logarithm with a toe and a shoulder, and colours that fade as they get bright.
 fn agx_like() -> ToneCurve {
     let (edge, toe, top) = (17, 0.01, 16.0);
-    let radiances = ToneTable::radiances(edge, toe, top).unwrap();
+    let radiances = ToneCurve::table_radiances(edge, toe, top).unwrap();
     let curve = |radiance: f32| {
         let at = ((radiance.max(1e-6) / 0.18).log2() + 10.0) / 16.5;
         1.0 / (1.0 + (-9.0 * (at.clamp(0.0, 1.0) - 0.6)).exp())
@@ -103,7 +103,7 @@ fn agx_like() -> ToneCurve {
             }
         }
     }
-    ToneTable::new(edge, toe, top, values).unwrap().into_tone_curve()
+    ToneCurve::of_table(edge, toe, top, values).unwrap()
 }
 
 /// Exchanging even halves changes nothing to the bit, with light that one of them alone has. (Of uneven ones, the order

@@ -80,13 +80,17 @@ impl ColourLut {
     /// what the LUT returns is taken for display-encoded sRGB. The curve owns the LUT. Its identity is its content, not
     /// its file.
     pub fn into_tone_curve(self, input: LutInput) -> ToneCurve {
-        let mut identity = format!("lut {input}").into_bytes();
+        self.encoded(&input.to_string(), move |c| input.encode(c))
+    }
+
+    /// The same with any encoding, called so.
+    pub(crate) fn encoded(self, by: &str, encode: impl Fn(f32) -> f32 + Send + Sync + 'static) -> ToneCurve {
+        let mut identity = format!("lut {by}").into_bytes();
         for table in [&self.curve, &self.cube] {
             identity.push(u8::from(table.is_some()));
             identity.extend(table.iter().flat_map(LutTable::bytes));
         }
-        let map = move |exposed: Rgb| self.map(exposed.map(|c| input.encode(c)));
-        ToneCurve::new(&identity, map)
+        ToneCurve::new(&identity, move |exposed| self.map(exposed.map(&encode)))
     }
 }
 
