@@ -17,7 +17,7 @@ use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
 };
 use noisefloor_scenefile::{LoadError, LoadOptions, Loaded, group_warnings};
-use noisefloor_sidecar::AdaptivePicture;
+use noisefloor_sidecar::{AdaptivePicture, Device};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
@@ -48,9 +48,9 @@ pub struct SourceJob {
     pub frame: Option<i32>,
     pub size: Option<(usize, usize)>,
     pub max_depth: Option<u32>,
-    /// What another renderer computes on, as it was typed.
+    /// What another renderer computes on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub device: Option<String>,
+    pub device: Option<Device>,
     /// How the built-in renderer loads scene files.
     pub scene_files: LoadOptions,
 }

@@ -1,5 +1,6 @@
 //! What an adapter declares about its renderer, and what a caller asks of it.
 
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -46,7 +47,8 @@ impl Renderer {
 /// assert_eq!("H200".parse::<Device>()?.to_string(), "H200");
 /// # Ok::<(), String>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String")]
 pub struct Device(Cow<'static, str>);
 
 impl Device {
@@ -75,6 +77,14 @@ impl FromStr for Device {
         }
         let known = [Self::AUTO, Self::CPU, Self::GPU].into_iter().find(|known| known.0 == text);
         Ok(known.unwrap_or_else(|| Self(Cow::Owned(text.trim().to_owned()))))
+    }
+}
+
+impl TryFrom<String> for Device {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
     }
 }
 

@@ -118,7 +118,6 @@ impl RendererArgs {
         let scene = scene.map(JobPath::from);
         let scene_files = self.scene_files.check();
         let Self { seed, size, max_depth, device, .. } = self;
-        let device = device.map(|device| device.to_string());
         let (same_seed, frame) = (false, None);
         let job = SourceJob { kind, scene, seed, same_seed, frame, size, max_depth, device, scene_files };
         Ok((job, resources))

@@ -135,9 +135,7 @@ pub(super) fn open_adapter(
     let mut sidecar = Job::new(scene);
     (sidecar.seed, sidecar.size, sidecar.max_depth) = (job.seed, job.size, job.max_depth);
     (sidecar.threads, sidecar.timeout) = (resources.threads, resources.timeout);
-    sidecar.frame = job.frame;
-    let device = job.device.as_deref().map(str::parse).transpose();
-    sidecar.device = device.map_err(|error| anyhow::anyhow!("--device: {error}"))?;
+    (sidecar.frame, sidecar.device) = (job.frame, job.device.clone());
     let source = (adapter.open)(&sidecar)?;
     let warnings = source.warnings().to_vec();
     Ok(Opened { source: Box::new(source), scene: stem(scene), warnings })

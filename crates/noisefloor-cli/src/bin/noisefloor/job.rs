@@ -10,6 +10,7 @@ use noisefloor_cli::sources::{Resources, SourceJob};
 use noisefloor_cli::spell::JobPath;
 use noisefloor_denoise::DenoisePasses;
 use noisefloor_rivals::RivalSpec;
+use noisefloor_sidecar::Device;
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -51,9 +52,9 @@ pub enum CriterionJob {
         lost: f64,
         /// Of the finished picture.
         passes: DenoisePasses,
-        /// What denoises, as it was typed.
+        /// What denoises.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        device: Option<String>,
+        device: Option<Device>,
     },
     Rival(RivalSpec),
 }

@@ -23,10 +23,10 @@ use noisefloor_cli::end::Usage;
 use noisefloor_cli::files::read_reference;
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::note;
-use noisefloor_cli::options::denoiser::filter_plan;
 use noisefloor_cli::say::one_line;
 use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_all_on_signal};
 use noisefloor_cli::sources::{Opened, Source};
+use noisefloor_sidecar::FilterPlan;
 use saving::Pace;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -87,7 +87,8 @@ impl Prepared {
         let (criterion, denoised) = match (&job.criterion, job.criterion.of(oracle.as_ref())) {
             (_, Some(criterion)) => (criterion, None),
             (CriterionJob::Denoised { lost, passes, device }, None) => {
-                let plan = filter_plan(device.as_deref(), resources.timeout)?;
+                let (device, timeout) = (device.clone(), resources.timeout);
+                let plan = FilterPlan { device, timeout, ..FilterPlan::default() };
                 let rays = job.source.first_hits_spp();
                 let (criterion, denoised) = denoised::begin(&mut source, rays, *lost, *passes, plan)?;
                 (criterion, Some(denoised))

@@ -292,7 +292,6 @@ impl RenderArgs {
         };
         let audience = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
         let limits = self.verdicts.limits(self.denoise.is_some(), &self.renderer, self.preset, audience)?;
-        let device = self.denoise_device.map(|device| device.to_string());
         let criterion = match (self.denoise, self.verdicts.criterion) {
             (Some(_), _) => {
                 let (lost, passes) = (self.verdicts.lost, self.verdicts.denoise_passes);
@@ -300,7 +299,7 @@ impl RenderArgs {
                 CriterionJob::Denoised {
                     lost: if draft { lost.max(DRAFT_LOST) } else { lost },
                     passes,
-                    device,
+                    device: self.denoise_device,
                 }
             }
             (None, CriterionChoice::Oracle) => {

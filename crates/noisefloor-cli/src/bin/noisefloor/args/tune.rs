@@ -192,9 +192,8 @@ impl TuneArgs {
         };
         let (criterion, viewing, audience) = if self.denoise.is_some() {
             self.eyes.unused("--denoise")?;
-            let device = self.denoise_device.map(|device| device.to_string());
             (
-                TuneCriterion::Denoised { lost: self.lost, device },
+                TuneCriterion::Denoised { lost: self.lost, device: self.denoise_device },
                 self.viewing.or_default(),
                 Audience::TRAINED,
             )

@@ -5,6 +5,7 @@ use noisefloor::{Audience, Oracle, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::sources::{Resources, SourceJob};
+use noisefloor_sidecar::Device;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -37,7 +38,7 @@ pub enum TuneCriterion {
     /// The noise of the picture.
     Noise(Box<Oracle>),
     /// What is wrong with the denoised picture, in JODs that its worst square may have lost.
-    Denoised { lost: f64, device: Option<String> },
+    Denoised { lost: f64, device: Option<Device> },
 }
 
 /// One line of the search.

@@ -7,12 +7,11 @@ use noisefloor::source::SourceIdentity;
 use noisefloor::stills::{StillError, StillWarning};
 use noisefloor::tune::{Knob, Looked, PicturePair, PixelCounts};
 use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
-use noisefloor_cli::options::denoiser::filter_plan;
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::{Opened, Resources, Source, SourceJob, SourceKind};
 use noisefloor_denoise::{DenoisedError, Denoiser, Guides, NoisyPicture, Oidn};
-use noisefloor_sidecar::ThresholdCommand;
+use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
 use noisefloor_vision::VisionModel;
 use std::fs::File;
 use std::mem::discriminant;
@@ -285,7 +284,8 @@ impl<'a> Judges<'a> {
         let denoiser = match criterion {
             TuneCriterion::Noise(_) => None,
             TuneCriterion::Denoised { device, .. } => {
-                let oidn = Oidn::start(filter_plan(device.as_deref(), timeout)?)?;
+                let oidn =
+                    Oidn::start(FilterPlan { device: device.clone(), timeout, ..FilterPlan::default() })?;
                 oidn.warnings().iter().for_each(|warning| note!("warning: {warning}"));
                 Some(oidn)
             }
