@@ -112,7 +112,7 @@ pub fn write(
         grid.save(dir.join(&map))?;
         page.add(&format!("{name}: who sees no difference"), &curves, "tiles.csv");
         let what = if threshold == CorpusThreshold::Mean { "the mean" } else { "the 95 % level" };
-        page.add(&format!("{name}: {what} in samples per pixel, as `train` gets it"), &map, "tiles.csv");
+        page.add(&format!("{name}: {what} in samples per pixel, as train gets it"), &map, "tiles.csv");
         if stack.fps().is_none() {
             pictures(&corpus_dir, study, number)?;
         }

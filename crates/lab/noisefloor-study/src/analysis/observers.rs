@@ -95,14 +95,27 @@ impl Observer {
     }
 
     /// This observer's threshold of a tile in samples per pixel: the mean of the stops, or of the
-    /// posterior.
+    /// posterior. A stop is the first level above a threshold, which is taken to lie in the middle below it.
     pub fn threshold(&self, study: &Study, place: TileKey) -> Option<f64> {
         if let Some(stops) = self.stops.get(&place).filter(|s| !s.is_empty()) {
             let spp = study.stacks[place.0 as usize].levels();
-            let sum: f64 = stops.iter().map(|&level| spp[level as usize] as f64).sum();
+            let middle = |&level: &u32| between(spp, level).iter().sum::<f64>() / 2.0;
+            let sum: f64 = stops.iter().map(|level| middle(level).exp()).sum();
             return Some(sum / stops.len() as f64);
         }
         self.measured.get(&place).map(|known| known.moments().0.exp())
+    }
+}
+
+/// The ends of where a threshold lies that was left at a level, in ln(spp): the level before, and that one. The reference
+/// has no noise, so that what is left there is taken to be one more step away.
+pub(super) fn between(spp: &[u64], level: u32) -> [f64; 2] {
+    let ln = |level: usize| (spp[level].max(1) as f64).ln();
+    let (at, last) = (level as usize, spp.len() - 1);
+    match at {
+        0 => [ln(0); 2],
+        _ if at == last && last > 1 => [ln(last - 1), 2.0 * ln(last - 1) - ln(last - 2)],
+        _ => [ln(at - 1), ln(at)],
     }
 }
 

@@ -57,7 +57,7 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
         chart
             .configure_mesh()
             .disable_x_mesh()
-            .x_labels(tiles.len().clamp(2, 16))
+            .x_labels((2 * tiles.len()).clamp(2, 24))
             .x_desc("tile, in the order of tiles.csv (blue: mean; red: 95 % see no difference)")
             .y_desc("samples per pixel")
             // Only where there is a tile
@@ -98,6 +98,7 @@ pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, Study
         root.fill(&WHITE).map_err(failed)?;
         let mut chart = ChartBuilder::on(&root)
             .margin(12)
+            .margin_right(32) // half of the last label
             .x_label_area_size(44)
             .y_label_area_size(64)
             .build_cartesian_2d((low..high).log_scale(), 0.0..1.0)

@@ -7,7 +7,7 @@
 //! So the covariance of two showings, over observers, is the variance between people, and that of two tiles its part
 //! that is common to all tiles.
 
-use super::observers::{Observer, TileKey, places};
+use super::observers::{Observer, TileKey, between, places};
 use super::summary::median;
 use crate::config::Study;
 use serde::Serialize;
@@ -98,19 +98,8 @@ fn has_room(study: &Study, observers: &[&Observer], place: TileKey) -> bool {
 /// The first two showings of a tile to an observer.
 fn twice(study: &Study, observer: &Observer, place: TileKey) -> Option<Twice> {
     let levels = study.stacks[place.0 as usize].levels();
-    let ln = |level: usize| (levels[level].max(1) as f64).ln();
-    // A threshold lies between the level where a tile was left and the one before; the reference has no noise, so that
-    // what is left there is taken to be one more step away
-    let between = |level: u32| {
-        let (at, last) = (level as usize, levels.len() - 1);
-        match at {
-            0 => [ln(0); 2],
-            _ if at == last && last > 1 => [ln(last - 1), 2.0 * ln(last - 1) - ln(last - 2)],
-            _ => [ln(at - 1), ln(at)],
-        }
-    };
     let [first, second, ..] = observer.stops.get(&place)?[..] else { return None };
-    let [a, b] = [between(first), between(second)];
+    let [a, b] = [first, second].map(|level| between(levels, level));
     let squared = |[low, high]: [f64; 2]| (high - low) * (high - low);
     Some(Twice {
         ln: [a, b].map(|[low, high]| 0.5 * (low + high)),

@@ -56,6 +56,8 @@ pub struct TileRow {
     pub level95_interval: Option<[f64; 2]>,
     /// Whether the 95 % level lies above the last level before the reference, and is therefore extrapolated.
     pub beyond: bool,
+    /// Samples per pixel of the reference, above which nothing is known.
+    pub reference: u64,
     /// Acquisition: probability of stops at least as unlike the fitted spread, if it were true. Below 0.01
     /// the estimates of the tile are doubtful.
     pub fit_probability: Option<f64>,
@@ -109,6 +111,7 @@ fn row(study: &Study, observers: &[&Observer], place: TileKey, alike: f64, seed:
         quartiles: fit.width,
         level95: fit.level95.value.exp(),
         level95_interval: enough.then_some(fit.level95.interval.map(f64::exp)),
+        reference: stack.levels()[stack.last() as usize],
         beyond: fit.level95.value.exp() > stack.levels()[stack.last() as usize - 1] as f64,
         fit_probability: fit.fit_probability(&stops, stack.levels(), design),
         fit,

@@ -71,6 +71,27 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
     assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
 }
 
+/// Levels by ×1.35: a chosen level is the first above a threshold, ×1.17 too high in the mean. With 33 observers of a spread
+/// of 0.45 in ln(spp), the mean over twelve studies is known to 0.45/√396 = 0.023, times 3.
+#[test]
+fn means_are_those_of_thresholds_not_of_levels() {
+    let levels: Vec<u64> = (0..24).map(|i| (10.0 * 1.35f64.powi(i)).round() as u64).collect();
+    let folder = Folder::new("acquisition", &["wall"], &levels, "");
+    let (study, public) = (folder.study(), public(0.1, 0.0));
+    let (mut ratio, mut holds) = (0.0, 0);
+    for seed in 0..12 {
+        for tile in &simulated(&study, &public, 33, seed).0.tiles {
+            let truth = public.levels(0, tile.tile)[1];
+            ratio += (tile.mean / truth).ln() / 24.0;
+            holds += usize::from(tile.mean_interval.is_some_and(|[low, high]| low <= truth && truth <= high));
+        }
+    }
+    println!("mean: ratio {:.3}, intervals that hold it {holds} of 24", f64::exp(ratio));
+    assert!(ratio.abs() < 0.07, "{ratio}");
+    // Of 12 independent ones, each 0.9 at least: fewer than 8 by chance once in 200
+    assert!(holds >= 16, "{holds}");
+}
+
 /// Root mean square error of single observers' ln(threshold), and clicks a tile.
 fn precision(study: &Arc<Study>, public: &Public, observers: u64) -> (f64, f64) {
     let (_, all) = simulated(study, public, observers, 7);

@@ -68,7 +68,13 @@ fn say_tiles(report: &StudyReport) -> Result<(), NotSaid> {
             Some([low, high]) => format!("{low:.0} to {high:.0}"),
             None => format!("none: {} observers, fewer than {LEAST_OBSERVERS}", t.observers),
         };
-        let beyond = if t.beyond { "  beyond the stack" } else { "" };
+        let beyond = match t.level95_interval {
+            _ if t.beyond => "  beyond the stack".to_owned(),
+            Some([_, high]) if high > t.reference as f64 => {
+                format!("  wider than the stack, whose reference has {}", t.reference)
+            }
+            _ => String::new(),
+        };
         let doubt =
             if t.fit_probability.is_some_and(|p| p < 0.01) { "  the spread does not fit" } else { "" };
         let levels = [t.median, t.mean, t.level95];
