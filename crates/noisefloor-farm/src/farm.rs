@@ -77,6 +77,10 @@ pub struct FarmProgress {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameProgress {
     pub frame: String,
+    /// Whether it waits for the frame whose exposure it is to have.
+    pub waits: bool,
+    /// Samples per pixel, in the mean.
+    pub spp: f64,
     /// Seconds left, at the pace of the last round.
     pub eta_seconds: Option<f64>,
     /// How far it is.
@@ -209,10 +213,12 @@ impl<'a, S: Studio> Farm<'a, S> {
         let delivered = round.tasks.iter().enumerate().filter(|task| is_there(*task)).count();
         let mut frames = Vec::new();
         for name in &names {
-            let state = self.folder.state(name)?;
+            let (state, shards) = (self.folder.state(name)?, self.folder.frame_job(name)?.shards);
             let pace = (round.brought > 0 && round.took > 0.0).then(|| round.brought as f64 / round.took);
             let eta_seconds = pace.zip(state.to_go).map(|(pace, samples)| samples as f64 / pace);
-            frames.push(FrameProgress { frame: name.clone(), eta_seconds, state });
+            let (waits, spp) =
+                (state.tiles == 0, state.samples as f64 / (shards.width * shards.height) as f64);
+            frames.push(FrameProgress { frame: name.clone(), waits, spp, eta_seconds, state });
         }
         let slurm_left = round.slurm().and_then(|jobs| match Slurm::left(jobs) {
             Ok(left) => Some(left),

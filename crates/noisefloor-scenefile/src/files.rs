@@ -250,7 +250,11 @@ pub(crate) fn has_memory(bytes: u64, each: u64, place: &Place) -> Result<(), Loa
 /// Reads a regular file.
 fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
     let failed = |cause: io::Error| {
-        let cause = io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display()));
+        // Where another file names it
+        let cause = match *place == Place::file(path) {
+            true => cause,
+            false => io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display())),
+        };
         LoadError::Read { place: place.clone(), cause }
     };
 

@@ -315,6 +315,10 @@ fn a_farm_renders_the_frames_of_a_sequence() {
         let status = succeed(&["farm", "status", text(&dir)]);
         assert!(status.contains("0002: waits for"), "{status}");
         assert!(status.contains("0001: waits for") == (name == "third"), "{status}");
+        let told: serde_json::Value =
+            serde_json::from_str(&succeed(&["farm", "status", text(&dir), "--json"])).unwrap();
+        assert!(told["frames"][1]["waits"] == true && told["frames"][1]["spp"] == 0.0, "{told}");
+        assert_eq!(told["frames"][0]["waits"], name == "third");
         // A coordinator that is started again between the rounds, and pictures as far as they are
         let task = |round: &str, task: &str| run(&["farm", "task", text(&dir), round, task]).status.success();
         assert!(task("1", "0") && task("1", "1") == (name == "eased"));

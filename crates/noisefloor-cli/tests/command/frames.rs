@@ -393,6 +393,14 @@ fn what_is_typed_wins_over_a_file_and_nonsense_is_refused() {
     fail(&["render", "--config", "absent.toml"], &["--config absent.toml"]);
     fs::write(&shot, "colour = \"green\"").unwrap();
     fail(&["render", "--config", text(&shot)], &["shot.toml: line 1: ", "no option colour"]);
+    // Paths of Windows, of which TOML reads the first as an escape that is none, and the second as a tab
+    for out in [r#"out = "c:\shots""#, r#"out = "c:\temp""#] {
+        fs::write(&shot, out).unwrap();
+        fail(
+            &["render", "--config", text(&shot)],
+            &["shot.toml: line 1: ", r"single quotes, as in 'c:\shots'"],
+        );
+    }
 }
 
 /// A draft stops where people want four times the samples; a final picture is judged twice.

@@ -171,7 +171,7 @@ fn step(dir: &Path, round: usize, sbatch: Vec<String>) -> anyhow::Result<ExitCod
 fn finished(here: &Here, dir: &Path) -> anyhow::Result<ExitCode> {
     if !here.quiet {
         let farm = here.farm(dir)?;
-        farm.progress()?.frames.iter().try_for_each(say_frame)?;
+        say_frames(&farm.progress()?.frames)?;
         say!("written to {}", farm.folder().path().display())?;
     }
     Ok(ExitCode::SUCCESS)
@@ -201,7 +201,7 @@ fn merge(task: &MergeTask) -> anyhow::Result<ExitCode> {
     let (shards, out, force) = match task {
         MergeTask::Farm(dir) => {
             for (frame, state) in here.farm(dir)?.claim()?.merge()? {
-                say_frame(&FrameProgress { frame, eta_seconds: None, state })?;
+                say_frame(&frame, None, &state)?;
             }
             return Ok(ExitCode::SUCCESS);
         }
@@ -375,7 +375,7 @@ fn status(dir: &Path, json: bool) -> anyhow::Result<ExitCode> {
         say_json(&progress)?;
         return Ok(ExitCode::SUCCESS);
     }
-    progress.frames.iter().try_for_each(say_frame)?;
+    say_frames(&progress.frames)?;
     if progress.done {
         say!("done in {} rounds", progress.round.saturating_sub(1))?;
     } else {
@@ -400,8 +400,12 @@ fn say_round(round: &Round) -> Result<(), NotSaid> {
     say!("round {number}: {batches} batches in {tasks} tasks, for {} frames{jobs}", frames.len())
 }
 
+fn say_frames(frames: &[FrameProgress]) -> Result<(), NotSaid> {
+    frames.iter().try_for_each(|known| say_frame(&known.frame, known.eta_seconds, &known.state))
+}
+
 /// One line about a frame.
-fn say_frame(FrameProgress { frame, eta_seconds, state }: &FrameProgress) -> Result<(), NotSaid> {
+fn say_frame(frame: &str, eta_seconds: Option<f64>, state: &FrameState) -> Result<(), NotSaid> {
     let FrameState { tiles, open, samples, sampled, rounds, done, .. } = state;
     if *tiles == 0 {
         return say!("{frame}: waits for the frame whose exposure it is to have");

@@ -35,6 +35,9 @@ fn config(typed: &[OsString]) -> Option<PathBuf> {
     typed.iter().zip(next).filter_map(named).last()
 }
 
+const QUOTES: &str =
+    "; in \"…\", \\ begins an escape: write paths of Windows in single quotes, as in 'c:\\shots'";
+
 /// The options of a file, checked one by one: what is wrong is said in the words of the file.
 fn options(path: &Path) -> anyhow::Result<Vec<OsString>> {
     let text = read_small(path)?;
@@ -43,7 +46,8 @@ fn options(path: &Path) -> anyhow::Result<Vec<OsString>> {
         Ok(table) => table,
         Err(error) => {
             let line = error.span().map_or(1, |span| line(span.start));
-            refuse!("line {line}: {}", error.message())
+            let escapes = text.lines().nth(line - 1).is_some_and(|words| words.contains('\\'));
+            refuse!("line {line}: {}{}", error.message(), if escapes { QUOTES } else { "" })
         }
     };
     let mut options = Vec::new();
@@ -52,6 +56,10 @@ fn options(path: &Path) -> anyhow::Result<Vec<OsString>> {
         let value = match value.as_ref() {
             Value::Boolean(true) => None,
             Value::Boolean(false) => continue,
+            // "c:\temp" is a tab and `emp`
+            Value::String(text) if text.contains(char::is_control) => {
+                refuse!("line {line}: {name} has a tab or the like in it{QUOTES}")
+            }
             Value::String(text) => Some(text.clone()),
             Value::Integer(number) => Some(number.to_string()),
             Value::Float(number) => Some(number.to_string()),
