@@ -794,7 +794,7 @@ fn attributes_are_for_all_that_comes() {
             format!("Attribute \"light\" \"float scale\" [.25] AreaLightSource \"diffuse\" \"rgb L\" [2 2 2] {SQUARE}"),
             0.5,
         ),
-        (format!("Attribute \"light\" \"float scale\" [.25] LightSource \"infinite\" \"rgb L\" [2 2 2]"), 0.5),
+        ("Attribute \"light\" \"float scale\" [.25] LightSource \"infinite\" \"rgb L\" [2 2 2]".to_owned(), 0.5),
         (
             format!(
                 "{SKY}Attribute \"texture\" \"float scale\" [.5] Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"w.png\"
