@@ -815,6 +815,37 @@ class Addon(unittest.TestCase):
                 self.assertLess(ratios[0], 1.2)
                 self.assertGreater(ratios[1], 1.2)
 
+    def test_passes_prefilter_and_quality_of_the_denoiser_are_cycles_own(self):
+        """The denoised picture of the add-on is that of Cycles, of the same samples."""
+        scene, made = room(), {}
+        if denoise.library() is None:
+            self.skipTest("this Blender has no Open Image Denoise")
+        cycles = scene.cycles
+        scene.noisefloor.use, cycles.use_denoising = False, True
+        scene.view_layers[0].cycles.denoising_store_passes = True
+        for how in [
+            ("RGB_ALBEDO_NORMAL", "ACCURATE", "HIGH"),
+            ("RGB_ALBEDO_NORMAL", "ACCURATE", "FAST"),
+            ("RGB_ALBEDO_NORMAL", "FAST", "HIGH"),
+            ("RGB_ALBEDO_NORMAL", "NONE", "BALANCED"),
+            ("RGB_ALBEDO", "ACCURATE", "HIGH"),
+            ("RGB", "FAST", "HIGH"),
+        ]:
+            cycles.denoising_input_passes, cycles.denoising_prefilter = how[:2]
+            if hasattr(cycles, "denoising_quality"):
+                cycles.denoising_quality = how[2]
+            elif how[2] != "HIGH":
+                continue
+            with Passes() as plain:
+                bpy.ops.render.render()
+            (found,) = plain.cycles["ViewLayer"]
+            judge = judging.Judge(scene, display.table(scene), None, True, False)
+            made[how] = judge.denoise({**found, "Combined": found["Noisy Image"]})
+            # Sums of float32 in the layers of a network, in any order
+            numpy.testing.assert_allclose(made[how], found["Combined"], rtol=1e-4, atol=1e-4, err_msg=str(how))
+        for one, other in itertools.combinations(made.values(), 2):
+            self.assertGreater(numpy.abs(one - other).max(), 1e-3)
+
     def test_a_threshold_for_marked_frames_is_that_of_the_hardest(self):
         scene = room(closed=True)
         scene.cycles.samples, scene.frame_start, scene.frame_end = 4096, 1, 20

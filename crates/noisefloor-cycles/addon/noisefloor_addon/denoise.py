@@ -12,6 +12,8 @@ import bpy
 import numpy
 
 CPU, FLOAT3 = 1, 3
+# By Cycles' names; what is not said is the highest
+QUALITIES = {"HIGH": None, "BALANCED": 5, "FAST": 4}
 # What denoises where Cycles computes on this
 GPUS = {"ONEAPI": 2, "CUDA": 3, "OPTIX": 3, "HIP": 4, "METAL": 5}
 
@@ -57,9 +59,10 @@ class Denoiser:
     """Open Image Denoise on a device, as `device` says. As long as it lives, a GPU keeps filters and memory, which take it long
     to make; the processor makes them anew, and has its memory to itself while Cycles renders."""
 
-    def __init__(self, path, kind=CPU, shared=None):
-        """shared: whether the device reads this process' memory, as every one of the processor does; others have their own."""
-        self.filters, self.buffers = {}, {}
+    def __init__(self, path, kind=CPU, shared=None, prefilter="ACCURATE", quality="HIGH"):
+        """shared: whether the device reads this process' memory, as every one of the processor does; others have their own.
+        prefilter, quality: as Cycles calls them."""
+        self.filters, self.buffers, self.prefilter, self.quality = {}, {}, prefilter, QUALITIES[quality]
         self.device = _Device(path, kind)
         self.shared = kind == CPU if shared is None else shared
 
@@ -67,8 +70,8 @@ class Denoiser:
         self._release()
 
     def denoise(self, colour, albedo=None, normal=None):
-        """float32 of shape (height, width, 3), or such a part of larger arrays. Albedo and normals are denoised first, as Cycles
-        does.
+        """float32 of shape (height, width, 3), or such a part of larger arrays. Albedo and normals are denoised first, if the
+        prefilter is accurate, or taken to be clean, unless it is fast.
 
         Raises RuntimeError with what OIDN says."""
         # OIDN takes rows by their distance, which is not negative: a picture that lies from the bottom is denoised so
@@ -79,12 +82,12 @@ class Denoiser:
         try:
             images = {role: self._image(role, picture) for role, picture in given.items()}
             guides = [role for role in images if role != "color"]
-            for role in guides:
+            for role in guides if self.prefilter == "ACCURATE" else []:
                 clean = self._image(f"clean {role}", numpy.empty_like(made), write=False)
                 self._run({role: images[role], "output": clean}, [])
                 images[role] = clean
             output = self._image("output", made, write=False)
-            self._run({**images, "output": output}, ["hdr", *(["cleanAux"] if guides else [])])
+            self._run({**images, "output": output}, ["hdr", *(["cleanAux"] if guides and self.prefilter != "FAST" else [])])
             if not self.shared:
                 oidn, buffer = self.device.oidn, output[1]
                 data, size = ctypes.c_void_p(made.ctypes.data), ctypes.c_size_t(made.nbytes)
@@ -122,6 +125,8 @@ class Denoiser:
             set_flag = getattr(oidn, "oidnSetFilterBool", None) or oidn.oidnSetFilter1b
             for flag in flags:
                 set_flag(filtered, flag.encode(), ctypes.c_bool(True))
+            if self.quality:
+                oidn.oidnSetFilterInt(filtered, b"quality", ctypes.c_int(self.quality))
         for role, (picture, buffer) in images.items():
             (height, width, _), (down, across, _) = picture.shape, picture.strides
             layout = [ctypes.c_size_t(number) for number in (width, height, 0, across, down)]

@@ -117,7 +117,7 @@ class Frame:
             self.engine.report(
                 {"WARNING"}, "noisefloor does not denoise: this Blender has no Open Image Denoise"
             )
-        if self.judge.library and self.scene.cycles.denoising_input_passes != "RGB":
+        if self.judge.library and self.judge.guides:
             layer.denoising_store_passes = True
             wanted += [(judging.NORMAL, 3, "XYZ"), (judging.ALBEDO, 3, "RGB")]
         rendered = self.engine.get_result().layers[self.layer].passes.keys()

@@ -21,7 +21,11 @@ class Judge:
         self.library = denoise.library() if denoised else None
         # What denoises, and why it is not what the scene says
         device, self.note = denoise.device(scene, self.library) if self.library else (denoise.CPU, None)
-        self.denoiser = denoise.Denoiser(self.library, device) if self.library else None
+        cycles = scene.cycles
+        # Quality came with Blender 4.2
+        how = {"prefilter": cycles.denoising_prefilter, "quality": getattr(cycles, "denoising_quality", "HIGH")}
+        self.denoiser = denoise.Denoiser(self.library, device, **how) if self.library else None
+        self.guides = {"RGB": [], "RGB_ALBEDO": [ALBEDO]}.get(cycles.denoising_input_passes, [ALBEDO, NORMAL])
         self.transparent = scene.render.film_transparent
         self.oracle = settings.oracle(self.settings)
         self.params = settings.params(scene, shown, film)
@@ -38,7 +42,7 @@ class Judge:
         return made
 
     def _colours(self, passes):
-        return self.denoiser.denoise(passes["Combined"][..., :3], passes.get(ALBEDO), passes.get(NORMAL))
+        return self.denoiser.denoise(passes["Combined"][..., :3], *(passes.get(name) for name in self.guides))
 
     def denoise_alone(self, picture):
         """A picture of three channels, denoised by itself: its edges are not those of albedo and normals."""
