@@ -77,19 +77,22 @@
 #define NF_REASON_FAILED 5
 
 // The search goes on.
-#define NF_TUNING_SEARCHING 0
+#define NF_SEARCH_SEARCHING 0
 
 // One picture with this setting shows nothing that should not be seen.
-#define NF_TUNING_FOUND 1
+#define NF_SEARCH_FOUND 1
 
 // Even the finest setting is not enough.
-#define NF_TUNING_AT_FINEST 2
+#define NF_SEARCH_AT_FINEST 2
 
 // Settings down to the finest give the same pictures: the renderer ignores the setting, or reaches another limit first.
-#define NF_TUNING_UNCHANGED 3
+#define NF_SEARCH_UNCHANGED 3
 
 // More samples do not make it better: what is wrong is no noise, few samples find the light, or the pictures are not independent.
-#define NF_TUNING_NOT_FALLING 4
+#define NF_SEARCH_NOT_FALLING 4
+
+// Finer settings leave as much, since the pixels that make it have the most samples that the renderer takes.
+#define NF_SEARCH_CAPPED 5
 
 // How a call ended. nf_last_error has the words.
 typedef enum {
@@ -131,14 +134,14 @@ typedef struct NfBackground NfBackground;
 // number of sessions can be made from it.
 typedef struct NfOracle NfOracle;
 
+// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
+typedef struct NfSearch NfSearch;
+
 // Film, oracle and limits of one picture.
 typedef struct NfSession NfSession;
 
 // How radiance is displayed, for NfParams: a table, or a .cube file.
 typedef struct NfTone NfTone;
-
-// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
-typedef struct NfTuning NfTuning;
 
 // Parameters of a session. Let nf_params_default fill them in, then change some.
 typedef struct {
@@ -275,15 +278,15 @@ typedef int32_t (*NfRender)(void *user, NfTile tile, uint64_t first, uint64_t sp
 
 // What to do next in a search, or how it ended.
 typedef struct {
-    // One of NF_TUNING_...
+    // One of NF_SEARCH_...
     uint32_t ending;
     // While searching: what two pictures are to be rendered with, each with a seed of its own, the same seeds in
     // every step.
     double each;
     // While searching: one picture with this setting is as good as the mean of the two, if noise follows the setting. At
-    // NF_TUNING_FOUND: the setting that is enough.
+    // NF_SEARCH_FOUND: the setting that is enough.
     double setting;
-} NfTuningStep;
+} NfSearchStep;
 
 // How far the mean of two pictures is from what may be seen, in its worst place.
 typedef struct {
@@ -298,10 +301,9 @@ typedef struct {
     // follow the threshold, and at most 1.41 times that where they do not. 0 if it is not known: then only pictures that were
     // rendered speak for a setting.
     double alone;
-    // Not 0 if nearly all noise is of pixels that have the fewest samples that the renderer takes: a finer threshold changes
-    // nothing until others have more, and the search takes a larger step. Where alone is 1.41 times the ratio, that is known
-    // without. nf_excess cannot know, and says 0.
-    uint32_t still;
+    // The ratio below which no finer threshold gets, since the pixels that make it have the most samples that the renderer
+    // takes; 0 if it is not known. nf_excess cannot know.
+    double floor;
 } NfExcess;
 
 #ifdef __cplusplus
@@ -653,24 +655,24 @@ NfStatus nf_check(NfRender render,
                   bool repeats_samples,
                   bool shared_pixels);
 
-// Searches a noise threshold, such as from 0.2 down to 0.001. The caller frees it with nf_tuning_free.
-NfStatus nf_tuning_of_threshold(double coarsest,
+// Searches a noise threshold, such as from 0.2 down to 0.001. The caller frees it with nf_search_free.
+NfStatus nf_search_of_threshold(double coarsest,
                                 double finest,
-                                NfTuning **tuning);
+                                NfSearch **search);
 
-// Searches samples per pixel, such as from 16 to 4096. The caller frees it with nf_tuning_free.
-NfStatus nf_tuning_of_samples(uint64_t least, uint64_t most, NfTuning **tuning);
+// Searches samples per pixel, such as from 16 to 4096. The caller frees it with nf_search_free.
+NfStatus nf_search_of_samples(uint64_t least, uint64_t most, NfSearch **search);
 
-// What to render next, or how the search ended. The same until nf_tuning_tell.
-NfStatus nf_tuning_next(const NfTuning *tuning, NfTuningStep *step);
+// What to render next, or how the search ended. The same until nf_search_tell.
+NfStatus nf_search_next(const NfSearch *search, NfSearchStep *step);
 
-// Says what was found of the two pictures that nf_tuning_next asked for, once. NF_STATUS_ARGUMENT if it has not asked since, and
+// Says what was found of the two pictures that nf_search_next asked for, once. NF_STATUS_ARGUMENT if it has not asked since, and
 // for ratios that are negative or not a number.
-NfStatus nf_tuning_tell(const NfTuning *tuning,
+NfStatus nf_search_tell(const NfSearch *search,
                         NfExcess excess);
 
 // Frees a search. NULL is ignored, a second time is NF_STATUS_HANDLE.
-NfStatus nf_tuning_free(NfTuning *tuning);
+NfStatus nf_search_free(NfSearch *search);
 
 // How far the noise of the mean of two pictures is from what people do not see, where it is worst. a and b are
 // linear radiance, floats = 3 * width * height values each, rendered with the same setting and different seeds. Of

@@ -6,46 +6,49 @@ use crate::oracle::NfOracle;
 use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard, set_last_warnings};
 use noisefloor::stills::StillError;
-use noisefloor::tune::{Ending, Excess, Knob, KnobError, Looked, Next, PairError, PicturePair, Tuning};
+use noisefloor::tune::{Ending, Excess, Knob, KnobError, Look, Looked, PairError, PicturePair, Search};
 use noisefloor::{Params, Rgb, tile::check_image};
 use noisefloor_denoise::DenoisedError;
 use std::sync::{Mutex, PoisonError};
 
 /// The search goes on.
-pub const NF_TUNING_SEARCHING: u32 = 0;
+pub const NF_SEARCH_SEARCHING: u32 = 0;
 /// One picture with this setting shows nothing that should not be seen.
-pub const NF_TUNING_FOUND: u32 = 1;
+pub const NF_SEARCH_FOUND: u32 = 1;
 /// Even the finest setting is not enough.
-pub const NF_TUNING_AT_FINEST: u32 = 2;
+pub const NF_SEARCH_AT_FINEST: u32 = 2;
 /// Settings down to the finest give the same pictures: the renderer ignores the setting, or reaches another limit first.
-pub const NF_TUNING_UNCHANGED: u32 = 3;
+pub const NF_SEARCH_UNCHANGED: u32 = 3;
 /// More samples do not make it better: what is wrong is no noise, few samples find the light, or the pictures are not independent.
-pub const NF_TUNING_NOT_FALLING: u32 = 4;
+pub const NF_SEARCH_NOT_FALLING: u32 = 4;
+
+/// Finer settings leave as much, since the pixels that make it have the most samples that the renderer takes.
+pub const NF_SEARCH_CAPPED: u32 = 5;
 
 /// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
-pub struct NfTuning(Mutex<Asked>);
+pub struct NfSearch(Mutex<Asked>);
 
 /// And whether it was asked since it was told.
 struct Asked {
-    tuning: Tuning,
+    search: Search,
     asked: bool,
 }
 
-impl handle::Handle for NfTuning {
-    const NAME: &str = "tuning";
+impl handle::Handle for NfSearch {
+    const NAME: &str = "search";
 }
 
 /// What to do next in a search, or how it ended.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
-pub struct NfTuningStep {
-    /// One of NF_TUNING_...
+pub struct NfSearchStep {
+    /// One of NF_SEARCH_...
     pub ending: u32,
     /// While searching: what two pictures are to be rendered with, each with a seed of its own, the same seeds in
     /// every step.
     pub each: f64,
     /// While searching: one picture with this setting is as good as the mean of the two, if noise follows the setting. At
-    /// NF_TUNING_FOUND: the setting that is enough.
+    /// NF_SEARCH_FOUND: the setting that is enough.
     pub setting: f64,
 }
 
@@ -64,10 +67,9 @@ pub struct NfExcess {
     /// follow the threshold, and at most 1.41 times that where they do not. 0 if it is not known: then only pictures that were
     /// rendered speak for a setting.
     pub alone: f64,
-    /// Not 0 if nearly all noise is of pixels that have the fewest samples that the renderer takes: a finer threshold changes
-    /// nothing until others have more, and the search takes a larger step. Where alone is 1.41 times the ratio, that is known
-    /// without. nf_excess cannot know, and says 0.
-    pub still: u32,
+    /// The ratio below which no finer threshold gets, since the pixels that make it have the most samples that the renderer
+    /// takes; 0 if it is not known. nf_excess cannot know.
+    pub floor: f64,
 }
 
 impl From<KnobError> for Failure {
@@ -76,68 +78,69 @@ impl From<KnobError> for Failure {
     }
 }
 
-/// Searches a noise threshold, such as from 0.2 down to 0.001. The caller frees it with nf_tuning_free.
+/// Searches a noise threshold, such as from 0.2 down to 0.001. The caller frees it with nf_search_free.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_tuning_of_threshold(
+pub unsafe extern "C" fn nf_search_of_threshold(
     coarsest: f64,
     finest: f64,
-    tuning: *mut *mut NfTuning,
+    search: *mut *mut NfSearch,
 ) -> NfStatus {
     // SAFETY: promised by the caller.
-    guard(|| unsafe { give(tuning, Knob::Threshold { coarsest, finest }) })
+    guard(|| unsafe { give(search, Knob::Threshold { coarsest, finest }) })
 }
 
-/// Searches samples per pixel, such as from 16 to 4096. The caller frees it with nf_tuning_free.
+/// Searches samples per pixel, such as from 16 to 4096. The caller frees it with nf_search_free.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_tuning_of_samples(least: u64, most: u64, tuning: *mut *mut NfTuning) -> NfStatus {
+pub unsafe extern "C" fn nf_search_of_samples(least: u64, most: u64, search: *mut *mut NfSearch) -> NfStatus {
     // SAFETY: promised by the caller.
-    guard(|| unsafe { give(tuning, Knob::Samples { least, most }) })
+    guard(|| unsafe { give(search, Knob::Samples { least, most }) })
 }
 
 /// # Safety
 /// As [`handle::give`].
-unsafe fn give(place: *mut *mut NfTuning, knob: Knob) -> Result<(), Failure> {
+unsafe fn give(place: *mut *mut NfSearch, knob: Knob) -> Result<(), Failure> {
     // SAFETY: as for this function.
     unsafe {
         handle::give(place, || {
-            let tuning = Tuning::new(knob)?;
-            Ok(NfTuning(Mutex::new(Asked { tuning, asked: false })))
+            let search = Search::new(knob)?;
+            Ok(NfSearch(Mutex::new(Asked { search, asked: false })))
         })
     }
 }
 
-/// What to render next, or how the search ended. The same until nf_tuning_tell.
+/// What to render next, or how the search ended. The same until nf_search_tell.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_tuning_next(tuning: *const NfTuning, step: *mut NfTuningStep) -> NfStatus {
+pub unsafe extern "C" fn nf_search_next(search: *const NfSearch, step: *mut NfSearchStep) -> NfStatus {
     guard(|| {
-        let tuning = handle::get(tuning)?;
+        let search = handle::get(search)?;
         let next = {
-            let mut asked = tuning.0.lock().unwrap_or_else(PoisonError::into_inner);
-            let next = asked.tuning.next();
-            asked.asked = matches!(next, Next::Render { .. });
-            next
+            let mut asked = search.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let next = asked.search.next();
+            asked.asked = next.is_some();
+            next.ok_or_else(|| asked.search.ending())
         };
-        let over = |ending| NfTuningStep { ending, ..NfTuningStep::default() };
+        let over = |ending| NfSearchStep { ending, ..NfSearchStep::default() };
         let next = match next {
-            Next::Render { each, setting } => NfTuningStep { ending: NF_TUNING_SEARCHING, each, setting },
-            Next::Done(Ending::Found { setting, .. }) => NfTuningStep { setting, ..over(NF_TUNING_FOUND) },
-            Next::Done(Ending::AtFinest { .. }) => over(NF_TUNING_AT_FINEST),
-            Next::Done(Ending::Unchanged) => over(NF_TUNING_UNCHANGED),
-            Next::Done(Ending::NotFalling { .. }) => over(NF_TUNING_NOT_FALLING),
-            other => unreachable!("C has no number for {other:?}"),
+            Ok(Look { each, setting, .. }) => NfSearchStep { ending: NF_SEARCH_SEARCHING, each, setting },
+            Err(Some(Ending::Found { setting, .. })) => NfSearchStep { setting, ..over(NF_SEARCH_FOUND) },
+            Err(Some(Ending::AtFinest { .. })) => over(NF_SEARCH_AT_FINEST),
+            Err(Some(Ending::Unchanged)) => over(NF_SEARCH_UNCHANGED),
+            Err(Some(Ending::NotFalling { .. })) => over(NF_SEARCH_NOT_FALLING),
+            Err(Some(Ending::Capped { .. })) => over(NF_SEARCH_CAPPED),
+            Err(other) => unreachable!("C has no number for {other:?}"),
         };
         // SAFETY: promised by the caller.
         unsafe { border::write(step, next, "step") }
     })
 }
 
-/// Says what was found of the two pictures that nf_tuning_next asked for, once. NF_STATUS_ARGUMENT if it has not asked since, and
+/// Says what was found of the two pictures that nf_search_next asked for, once. NF_STATUS_ARGUMENT if it has not asked since, and
 /// for ratios that are negative or not a number.
 #[unsafe(no_mangle)]
-pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> NfStatus {
+pub extern "C" fn nf_search_tell(search: *const NfSearch, excess: NfExcess) -> NfStatus {
     guard(|| {
-        let NfExcess { ratio, x, y, pictures, alone, still } = excess;
-        for (name, value) in [("ratio", ratio), ("alone", alone)] {
+        let NfExcess { ratio, x, y, pictures, alone, floor } = excess;
+        for (name, value) in [("ratio", ratio), ("alone", alone), ("floor", floor)] {
             if value.is_nan() || value < 0.0 {
                 let what = "0 or more, or infinite where it cannot be told";
                 return Err(Failure::new(
@@ -148,22 +151,22 @@ pub extern "C" fn nf_tuning_tell(tuning: *const NfTuning, excess: NfExcess) -> N
         }
         let place = Some((x as usize, y as usize));
         let alone = (alone > 0.0).then_some(alone);
-        let tuning = handle::get(tuning)?;
-        let mut asked = tuning.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let search = handle::get(search)?;
+        let mut asked = search.0.lock().unwrap_or_else(PoisonError::into_inner);
         if !std::mem::take(&mut asked.asked) {
-            let what = "nf_tuning_tell answers nf_tuning_next, once; after the end there is nothing to tell";
+            let what = "nf_search_tell answers nf_search_next, once; after the end there is nothing to tell";
             return Err(Failure::new(NfStatus::Argument, what.to_owned()));
         }
         let told = Excess::new(ratio).at(place).of_pictures(pictures).with_alone(alone);
-        asked.tuning.tell(told.with_still(still != 0));
+        asked.search.tell(told.with_floor(floor), &[]);
         Ok(())
     })
 }
 
 /// Frees a search. NULL is ignored, a second time is NF_STATUS_HANDLE.
 #[unsafe(no_mangle)]
-pub extern "C" fn nf_tuning_free(tuning: *mut NfTuning) -> NfStatus {
-    guard(|| handle::free(tuning))
+pub extern "C" fn nf_search_free(search: *mut NfSearch) -> NfStatus {
+    guard(|| handle::free(search))
 }
 
 /// How far the noise of the mean of two pictures is from what people do not see, where it is worst. a and b are
@@ -284,10 +287,10 @@ unsafe fn write(place: *mut NfExcess, looked: Result<Looked, PairError>) -> Resu
     set_last_warnings(&[]);
     let Looked { excess, warnings, .. } = looked.map_err(odd)?;
     set_last_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
-    let Excess { ratio, place: at, pictures, alone, still, .. } = excess;
+    let Excess { ratio, place: at, pictures, alone, floor, .. } = excess;
     let (x, y) = at.unwrap_or_default();
-    let (alone, still) = (alone.unwrap_or(0.0), still.into());
-    let found = NfExcess { ratio, x: x as u32, y: y as u32, pictures, alone, still };
+    let alone = alone.unwrap_or(0.0);
+    let found = NfExcess { ratio, x: x as u32, y: y as u32, pictures, alone, floor };
     // SAFETY: as for this function.
     unsafe { border::write(place, found, "excess") }
 }

@@ -815,6 +815,29 @@ class Addon(unittest.TestCase):
                 self.assertLess(ratios[0], 1.2)
                 self.assertGreater(ratios[1], 1.2)
 
+    def test_drivers_and_keys_of_what_is_borrowed_change_nothing(self):
+        found, said = [], []
+
+        def keys(scene):
+            scene.cycles.keyframe_insert("seed", frame=1)
+            scene.cycles.adaptive_threshold = 0.05
+            scene.cycles.keyframe_insert("adaptive_threshold", frame=1)
+
+        for animate in (
+            lambda scene: None,
+            lambda scene: setattr(scene.driver_add("cycles.seed").driver, "expression", "frame"),
+            keys,
+        ):
+            scene = room()
+            scene.cycles.samples, scene.cycles.seed = 512, scene.frame_current
+            animate(scene)
+            self.assertEqual(bpy.ops.render.noisefloor_threshold(), {"FINISHED"})
+            found.append(scene.cycles.adaptive_threshold)
+            said.append("Noise Threshold has keys" in hooks.state.summary)
+        self.assertEqual(found[1:], found[:1] * 2)
+        # Those of the threshold itself will overwrite what was found
+        self.assertEqual(said, [False, False, True])
+
     def test_passes_prefilter_and_quality_of_the_denoiser_are_cycles_own(self):
         """The denoised picture of the add-on is that of Cycles, of the same samples."""
         scene, made = room(), {}
@@ -917,40 +940,6 @@ class Addon(unittest.TestCase):
             bpy.ops.render.noisefloor_threshold()
         self.assertEqual(facts(scene), before)
 
-    def test_what_one_picture_leaves_follows_from_the_samples_that_pixels_have(self):
-        class Excess:
-            def squares(self):
-                return [(0, 0, 64, 64, 0.8), (64, 0, 64, 64, 0.6)]
-
-        random = numpy.random.default_rng(2)
-
-        def left(counts, fewest=(48, 48)):
-            pair = [
-                {"Combined": numpy.float32(random.normal(0.5, 0.1, (64, 128, 4))), frame.COUNT: count}
-                for count in counts
-            ]
-            return tune.alone(Excess(), pair, fewest, 4096)
-
-        def count(first, second):
-            made = numpy.full((64, 128, 1), first, numpy.float32)
-            made[::2] = second
-            return made
-
-        # All have the fewest, or the most, samples; all have more; and every other row has
-        for counts, times in [((48, 48), 2), ((4096, 4096), 2), ((64, 640), 1), ((48, 64), 1.5)]:
-            said, still = left([count(*counts)] * 2)
-            self.assertAlmostEqual(said / 0.8, times**0.5, delta=0.03)
-            self.assertEqual(still, times == 2)
-        # One picture has twice as many at the least, or a half more
-        for few, times in [(96, 1), (64, 1.5)]:
-            said, still = left([count(48, 48)] * 2, (48, few))
-            self.assertAlmostEqual(said / 0.8, times**0.5, delta=0.001)
-            self.assertTrue(still)
-        # A place that is better, but whose pixels have the fewest, is worse alone
-        part = count(64, 64)
-        part[:, 64:] = 48
-        self.assertAlmostEqual(left([part, part])[0], 0.6 * 2**0.5, delta=0.01)
-
     def test_what_one_picture_leaves_is_what_it_leaves(self):
         """Predicted of a finer threshold, and looked at."""
         scene, params = room(closed=True), None
@@ -966,14 +955,15 @@ class Addon(unittest.TestCase):
                 (found_passes,) = plain.cycles["ViewLayer"]
                 found_passes[frame.COUNT] = sampling.counts(found_passes[frame.COUNT], fewest, threshold, 4096)
                 found.append(found_passes)
-            return found, noisefloor.excess(*(each["Combined"][..., :3] for each in found), params=params)
+            counts = (*(each[frame.COUNT][..., 0] for each in found), each, single, 4096)
+            return found, noisefloor.excess(*(each["Combined"][..., :3] for each in found), params=params, counts=counts)
 
         single = sampling.least(0, 0.03 / 2**0.5, 4096)
         each, fewest = sampling.half(single)
         self.assertEqual((single, each, sampling.least(fewest, 0.03, 4096)), (64, 32, 32))
         pictures, coarse = pair(0.03, fewest)
         self.assertEqual(min(picture[frame.COUNT].min() for picture in pictures), 32)
-        said, _ = tune.alone(coarse, pictures, (each, single), 4096)
+        said = coarse.alone
         self.assertTrue(coarse.ratio <= said < 2**0.5 * coarse.ratio, (coarse.ratio, said))
         _, fine = pair(0.03 / 2**0.5)
         # Of one picture, √2 times what their mean has; seeds differ
@@ -1008,6 +998,7 @@ class Addon(unittest.TestCase):
         scene.cycles.use_adaptive_sampling = True
         # Of other tests
         hooks.state.took.clear()
+        hooks.state.tried.clear()
         self.assertEqual(
             [text for _, text in drawn(scene)],
             [
@@ -1041,6 +1032,13 @@ class Addon(unittest.TestCase):
         self.assertTrue(all(0 <= share <= 1 for _, share, _ in shares), shares)
         self.assertTrue(all(left is None or left >= 0 for *_, left in shares), shares)
         self.assertEqual(shares[-1][1:], (0.0, None))
+        # What other thresholds leave and take, from coarse to fine, and the one that was found
+        bars = [text for kind, text in drawn(scene) if kind == "progress"]
+        thresholds = [float(text.split(":")[0]) for text in bars]
+        self.assertEqual(thresholds, sorted(thresholds, reverse=True))
+        (found,) = (text for text in bars if text.endswith(" (found)"))
+        self.assertTrue(found.startswith(f"{scene.cycles.adaptive_threshold:.3g}: "), bars)
+        self.assertRegex(found, r": (0\.\d\d|1\.00) of what may be seen, \d+ s ")
 
     def test_gpus_are_used_as_the_scene_says(self):
         """By fakes: there is no GPU here."""

@@ -42,7 +42,7 @@ const ERR_BY_IN_COMPANY: f64 = 1.1;
 /// JODs that a tile may lose, unless one says otherwise. Where people stopped seeing *noise*, zones had lost as much,
 /// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/stops.md`).
 pub const DEFAULT_JODS_LOST: f64 = 0.3;
-/// Edge of the square that a smaller tile is judged in, in pixels: as [`noisefloor::tune::squares`].
+/// Edge of the square that a smaller tile is judged in, in pixels: as [`noisefloor::tune::PicturePair::squares`].
 const SQUARE: usize = 64;
 /// Contrasts between which an error is sought that is just allowed, and how well it is found.
 const CONTRASTS: (f64, f64) = (1.0 / 64.0, 8.0);

@@ -2,14 +2,14 @@
 
 use crate::estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY};
 use crate::unmet::jods_lost_unmet;
-use noisefloor::tune::{Looked, PairError, PicturePair, PixelCounts, squares};
+use noisefloor::tune::{Looked, PairError, PicturePair, PixelCounts};
 use noisefloor::{Film, Params, Rgb, Tile, Viewing};
 use noisefloor_vision::{VisionError, VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 
 impl DenoisedError {
     /// Looks at two pictures of which a denoiser made these, each without a look at the other: how far the worst of their
-    /// [`squares`] is from having lost `lost` JODs, with the margin of [`ESTIMATE_ERRS_BY`]: where the ratio is 1, two thirds of
+    /// squares is from having lost `lost` JODs, with the margin of [`ESTIMATE_ERRS_BY`]: where the ratio is 1, two thirds of
     /// that are estimated. Or, if that is more, from losing as much by light that it is likely to lack ([`jods_lost_unmet`]).
     /// [`DenoisedError::map_of_jods_lost`] makes the map. `counts` are as for [`PicturePair::look`].
     ///
@@ -27,7 +27,7 @@ impl DenoisedError {
         let mut estimated = None;
         let looked = pair.look_by(params, counts, |display, film| {
             let error = Self::new(&halves, display).map_err(|error| PairError::Judge(error.into()))?;
-            let squares = error.squares(film, lost, &params.viewing);
+            let squares = error.lost_in(pair.squares(), film, lost, &params.viewing);
             estimated = Some(error);
             squares.map_err(|error| PairError::Judge(error.into()))
         })?;
@@ -36,7 +36,13 @@ impl DenoisedError {
     }
 
     /// What each square may have lost, over what it may lose.
-    fn squares(&self, film: &Film, lost: f64, viewing: &Viewing) -> Result<Vec<(Tile, f64)>, VisionError> {
+    fn lost_in(
+        &self,
+        squares: Vec<Tile>,
+        film: &Film,
+        lost: f64,
+        viewing: &Viewing,
+    ) -> Result<Vec<(Tile, f64)>, VisionError> {
         let eyes = VisionModel::new(viewing);
         let unmet = jods_lost_unmet(film, self.display(), viewing);
         let ratio = |room: &mut VisionWorkspace, square: Tile| {
@@ -44,7 +50,7 @@ impl DenoisedError {
             let unmet = unmet.iter().filter(|(tile, _)| overlap(tile, &square)).map(|(_, lost)| *lost);
             Ok((square, unmet.fold(estimated * ESTIMATE_ERRS_BY, f64::max) / lost))
         };
-        squares(self.size()).into_par_iter().map_init(VisionWorkspace::default, ratio).collect()
+        squares.into_par_iter().map_init(VisionWorkspace::default, ratio).collect()
     }
 }
 

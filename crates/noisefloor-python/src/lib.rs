@@ -65,7 +65,7 @@ mod _noisefloor {
     #[pymodule_export]
     use crate::tone::{PyLut, PyToneTable};
     #[pymodule_export]
-    use crate::tune::{PyExcess, PyLook, PySearch, PyTuning, excess};
+    use crate::tune::{PyExcess, PyLook, PySearch, excess};
     #[pymodule_export]
     use crate::verdicts::{PyRequest, PyStop, PyTile, PyVerdict};
     use pyo3::prelude::*;

@@ -6,13 +6,11 @@ use crate::oracle::PyOracle;
 use crate::params::PyParams;
 use crate::pool;
 use noisefloor::stills::StillWarning;
-use noisefloor::tune::{
-    Ending, Excess, Knob, Look, Looked, Next, PairError, PicturePair, Search, Tuning, crops_for,
-};
+use noisefloor::tune::{Ending, Excess, Knob, Look, Looked, PairError, PicturePair, PixelCounts, Search};
 use noisefloor::{Oracle, Params, Rgb, Tile, Viewing};
 use noisefloor_denoise::{DEFAULT_JODS_LOST, DenoisedError};
 use noisefloor_vision::VisionModel;
-use numpy::PyArray2;
+use numpy::{AllowTypeChange, PyArray2, PyArrayLike2};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::ffi::CString;
@@ -44,6 +42,12 @@ impl PyExcess {
     #[getter]
     fn ratio(&self) -> f64 {
         self.excess.ratio
+    }
+
+    /// The ratio of one picture whose threshold is finer by the root of two; None without counts of samples.
+    #[getter]
+    fn alone(&self) -> Option<f64> {
+        self.excess.alone
     }
 
     /// The worst place, (x, y).
@@ -80,37 +84,15 @@ impl PyExcess {
     }
 }
 
-/// Tuning(*, threshold=None, samples=None) --
-///
-/// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
-///
-/// threshold: (coarsest, finest), such as (0.2, 0.001). samples: (least, most), such as (16, 4096). One of both.
-///
-///     tuning = noisefloor.Tuning(threshold=(0.2, 0.001))
-///     while (each := tuning.next()) is not None:
-///         tuning.tell(noisefloor.excess(render(each, seed=1), render(each, seed=2)))
-///     print(tuning.ending, tuning.setting)
-///
-/// One picture with the setting found shows nothing that should not be seen: two with it were looked at, and of a threshold each of
-/// them is good enough; or alone (see tell) says so.
-///
-/// Raises ParameterError if the range is empty, or wider than 10⁹.
-#[pyclass(frozen, name = "Tuning", module = "noisefloor")]
-pub(crate) struct PyTuning(Mutex<Asked<Tuning>>);
-
 /// A search, and whether it was asked since it was told.
-struct Asked<T> {
-    search: T,
+pub(crate) struct Asked {
+    search: Search,
     asked: bool,
 }
 
-impl<T> Asked<T> {
-    fn new(search: T) -> Mutex<Self> {
-        Mutex::new(Self { search, asked: false })
-    }
-
+impl Asked {
     /// It is to be told what it asked for, once.
-    fn told(&mut self) -> PyResult<&mut T> {
+    fn told(&mut self) -> PyResult<&mut Search> {
         if std::mem::take(&mut self.asked) {
             return Ok(&mut self.search);
         }
@@ -119,10 +101,6 @@ impl<T> Asked<T> {
              after the end there is nothing to tell",
         ))
     }
-}
-
-fn lock<T>(search: &Mutex<T>) -> MutexGuard<'_, T> {
-    search.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A number of how much is left, not negative.
@@ -135,12 +113,7 @@ fn ratio(name: &str, value: f64) -> PyResult<f64> {
     )))
 }
 
-/// With what is known of one picture.
-fn with_known(excess: Excess, alone: Option<f64>, still: bool) -> PyResult<Excess> {
-    Ok(excess.with_alone(alone.map(|alone| ratio("alone", alone)).transpose()?).with_still(still))
-}
-
-fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Tuning> {
+fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Search> {
     let knob = match (threshold, samples) {
         (Some((coarsest, finest)), None) => Knob::Threshold { coarsest, finest },
         (None, Some((least, most))) => Knob::Samples { least, most },
@@ -150,91 +123,7 @@ fn begin(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult
             ));
         }
     };
-    Tuning::new(knob).map_err(|error| ParameterError::new_err(error.to_string()))
-}
-
-fn ending(next: Next) -> Option<&'static str> {
-    match next {
-        Next::Done(ending) => Some(ending.name()),
-        _ => None,
-    }
-}
-
-fn setting(next: Next) -> Option<f64> {
-    match next {
-        Next::Done(Ending::Found { setting, .. }) => Some(setting),
-        _ => None,
-    }
-}
-
-fn steps(tuning: &Tuning) -> Vec<(f64, f64)> {
-    tuning.steps().iter().map(|step| (step.setting, step.excess.ratio)).collect()
-}
-
-#[pymethods]
-impl PyTuning {
-    #[new]
-    #[pyo3(signature = (*, threshold = None, samples = None))]
-    fn new(threshold: Option<(f64, f64)>, samples: Option<(u64, u64)>) -> PyResult<Self> {
-        Ok(Self(Asked::new(begin(threshold, samples)?)))
-    }
-
-    /// next() --
-    ///
-    /// What two pictures are to be rendered with, each with a seed of its own, the same seeds in every step; None at the
-    /// end. The same until tell().
-    fn next(&self) -> Option<f64> {
-        let mut tuning = lock(&self.0);
-        match tuning.search.next() {
-            Next::Render { each, .. } => {
-                tuning.asked = true;
-                Some(each)
-            }
-            _ => None,
-        }
-    }
-
-    /// tell(excess, *, alone=None, still=False) --
-    ///
-    /// What was found of the two pictures that next() has asked for: an Excess, or its ratio.
-    ///
-    /// alone: the ratio of one picture whose threshold is finer by the root of two, if it is known how the samples of pixels follow
-    ///     the threshold: that of the mean where they do, and at most 1.41 times that where they do not. None: only pictures that
-    ///     were rendered speak for a setting.
-    /// still: whether nearly all noise is of pixels that have the fewest samples that the renderer takes, so that a finer threshold
-    ///     changes nothing until others have more. Where alone is 1.41 times excess, that is known without.
-    ///
-    /// Raises ParameterError for a ratio that is negative or not a number, and for what was not asked for.
-    #[pyo3(signature = (excess, *, alone = None, still = false))]
-    fn tell(&self, excess: ExcessLike<'_>, alone: Option<f64>, still: bool) -> PyResult<()> {
-        let excess = match excess {
-            ExcessLike::Whole(whole) => whole.excess,
-            ExcessLike::Ratio(value) => Excess::new(ratio("an excess", value)?),
-        };
-        let excess = with_known(excess, alone, still)?;
-        lock(&self.0).told()?.tell(excess);
-        Ok(())
-    }
-
-    /// How it ended: "found", "at-finest" (even the finest setting is not enough), "unchanged" (settings down to the
-    /// finest give the same pictures), or "not-falling" (more samples do not make it better); None before that.
-    #[getter]
-    fn ending(&self) -> Option<&'static str> {
-        ending(lock(&self.0).search.next())
-    }
-
-    /// The setting that is just enough; None unless one was found.
-    #[getter]
-    fn setting(&self) -> Option<f64> {
-        setting(lock(&self.0).search.next())
-    }
-
-    /// What was tried: (setting, ratio) of each step. One picture with the setting is as good as the mean of the two
-    /// that were rendered for it, if noise follows the setting.
-    #[getter]
-    fn steps(&self) -> Vec<(f64, f64)> {
-        steps(&lock(&self.0).search)
-    }
+    Search::new(knob).map_err(|error| ParameterError::new_err(error.to_string()))
 }
 
 /// What is to be rendered twice, with different seeds, and judged.
@@ -252,18 +141,33 @@ pub(crate) struct PyLook {
 
 /// Search(*, threshold=None, samples=None, views=1, size=None) --
 ///
-/// A Tuning over one or several views, such as frames of a sequence: all of them with the first setting, and then the
-/// hardest first, until one fails. What is to be rendered comes from a loop over it:
+/// The search for the setting of a renderer at which nobody sees noise: its noise threshold, or samples per pixel.
 ///
+/// threshold: (coarsest, finest), such as (0.2, 0.001). samples: (least, most), such as (16, 4096). One of both. What is to be
+///     rendered comes from a loop over it:
+///
+///     search = noisefloor.Search(threshold=(0.2, 0.001))
 ///     for look in search:
-///         search.tell(noisefloor.excess(render(look, seed=1), render(look, seed=2)))
+///         search.tell(noisefloor.excess(render(look.each, seed=1), render(look.each, seed=2)))
+///     print(search.ending, search.setting)
 ///
+/// views: number of pictures, such as frames of a sequence. All are rendered with the first setting, and then the hardest first,
+///     until one fails.
 /// size: (width, height) of each view, if the renderer can render a part of it. Then crops around the worst squares stand
 ///     for a large picture, at most a third of its pixels, and the whole is looked at again in the end.
 ///
-/// Raises ParameterError if the range is empty.
+/// One picture with the setting found shows nothing that should not be seen: two with it were looked at, and of a threshold each of
+/// them is good enough; or the counts of their samples (see excess) say so.
+///
+/// Raises ParameterError if the range is empty, or wider than 10⁹.
 #[pyclass(frozen, name = "Search", module = "noisefloor")]
-pub(crate) struct PySearch(Mutex<Asked<Search>>);
+pub(crate) struct PySearch(Mutex<Asked>);
+
+impl PySearch {
+    fn lock(&self) -> MutexGuard<'_, Asked> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 #[pymethods]
 impl PySearch {
@@ -278,15 +182,16 @@ impl PySearch {
         if !(1..=MOST_VIEWS).contains(&views) {
             return Err(ParameterError::new_err(format!("views must be 1 to {MOST_VIEWS}, not {views}")));
         }
-        let crops = size.map_or(0, crops_for);
-        Ok(Self(Asked::new(Search::new(begin(threshold, samples)?, views, crops))))
+        let crops = size.map_or(0, Search::crops_for);
+        let search = begin(threshold, samples)?.with_views(views).with_crops(crops);
+        Ok(Self(Mutex::new(Asked { search, asked: false })))
     }
 
     /// next() --
     ///
     /// The next Look; None at the end. The same until tell().
     fn next(&self) -> Option<PyLook> {
-        let mut search = lock(&self.0);
+        let mut search = self.lock();
         let look = search.search.next();
         search.asked = look.is_some();
         look.map(|Look { each, view, crop, is_rendered, .. }| {
@@ -301,7 +206,7 @@ impl PySearch {
 
     /// The next Look, as next(); raises ParameterError if tell() was not called since the last one.
     fn __next__(&self) -> PyResult<Option<PyLook>> {
-        if lock(&self.0).asked {
+        if self.lock().asked {
             return Err(ParameterError::new_err(
                 "tell() what was found of this look, then ask for the next one",
             ));
@@ -309,42 +214,53 @@ impl PySearch {
         Ok(self.next())
     }
 
-    /// tell(excess, *, alone=None, still=False) --
+    /// tell(excess, *, alone=None) --
     ///
-    /// What was found of the two pictures that were asked for, an Excess; alone and still as of a Tuning.
+    /// What was found of the two pictures that were asked for: an Excess, or its ratio, of which no crops come.
     ///
-    /// Raises ParameterError as that of a Tuning.
-    #[pyo3(signature = (excess, *, alone = None, still = false))]
-    fn tell(&self, excess: PyRef<'_, PyExcess>, alone: Option<f64>, still: bool) -> PyResult<()> {
-        let told = with_known(excess.excess, alone, still)?;
-        lock(&self.0).told()?.tell(told, &excess.squares);
+    /// alone: the ratio of one picture whose threshold is finer by the root of two, if it is known how the samples of pixels follow
+    ///     the threshold: that of the mean where they do, and at most 1.41 times that where they do not. None: as the Excess
+    ///     has it from counts; without, only pictures that were rendered speak for a setting.
+    ///
+    /// Raises ParameterError for a ratio that is negative or not a number, and for what was not asked for.
+    #[pyo3(signature = (excess, *, alone = None))]
+    fn tell(&self, excess: ExcessLike<'_>, alone: Option<f64>) -> PyResult<()> {
+        let alone = alone.map(|alone| ratio("alone", alone)).transpose()?;
+        let (told, squares) = match &excess {
+            ExcessLike::Whole(whole) => (whole.excess, whole.squares.as_slice()),
+            ExcessLike::Ratio(value) => (Excess::new(ratio("an excess", *value)?), [].as_slice()),
+        };
+        self.lock().told()?.tell(told.with_alone(alone.or(told.alone)), squares);
         Ok(())
     }
 
     /// The views, hardest first as far as it is known.
     #[getter]
     fn views(&self) -> Vec<usize> {
-        lock(&self.0).search.views().to_vec()
+        self.lock().search.views().to_vec()
     }
 
-    /// How it ended, as of a Tuning; None before that.
+    /// How it ended: "found", "at-finest" (even the finest setting is not enough), "unchanged" (settings down to the finest give the
+    /// same pictures), "capped" (pixels have the most samples), or "not-falling" (more samples do not make it better); None before that.
     #[getter]
     fn ending(&self) -> Option<&'static str> {
-        let Asked { search, .. } = &*lock(&self.0);
-        if search.next().is_some() { None } else { ending(search.tuning().next()) }
+        self.lock().search.ending().map(|ending| ending.name())
     }
 
     /// The setting that is just enough; None unless one was found.
     #[getter]
     fn setting(&self) -> Option<f64> {
-        let Asked { search, .. } = &*lock(&self.0);
-        if search.next().is_some() { None } else { setting(search.tuning().next()) }
+        match self.lock().search.ending() {
+            Some(Ending::Found { setting, .. }) => Some(setting),
+            _ => None,
+        }
     }
 
-    /// What was tried: (setting, ratio) of each step, as of a Tuning.
+    /// What was tried: (setting, ratio) of each step. One picture with the setting is as good as the mean of the two
+    /// that were rendered for it, if noise follows the setting.
     #[getter]
     fn steps(&self) -> Vec<(f64, f64)> {
-        steps(lock(&self.0).search.tuning())
+        self.lock().search.steps().map(|(setting, excess)| (setting, excess.ratio)).collect()
     }
 }
 
@@ -368,13 +284,16 @@ enum ExcessLike<'py> {
 ///     just-objectionable differences (JOD) that the worst square of 64 pixels may have lost, 1.5 times the estimate, to
 ///     lost; nobody has been asked about denoised pictures.
 /// spp: samples per pixel of each, for an audience that is no factor.
+/// counts: (of_a, of_b, fewest, fewest_alone, most), if the renderer tells the samples of its pixels: two arrays of shape (height,
+///     width), the fewest that it takes of a pixel of these pictures, and of one picture whose threshold is finer by the root of
+///     two (twice as many, where the two share them), and the most.
 ///
 /// The interpreter's lock is released. Warns of what is likely wrong with the pictures, such as another exposure of one.
 ///
 /// Raises SizeError, CriterionError, and PictureError if the pictures cannot be judged: the same twice, for example, or no
 /// two of one view.
 #[pyfunction]
-#[pyo3(signature = (a, b, *, oracle = None, params = None, denoised = None, lost = DEFAULT_JODS_LOST, spp = 128.0))]
+#[pyo3(signature = (a, b, *, oracle = None, params = None, denoised = None, lost = DEFAULT_JODS_LOST, spp = 128.0, counts = None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn excess(
     py: Python<'_>,
@@ -385,6 +304,7 @@ pub(crate) fn excess(
     denoised: Option<(Pixels<'_>, Pixels<'_>)>,
     lost: f64,
     spp: f64,
+    counts: Option<Counts<'_>>,
 ) -> PyResult<PyExcess> {
     if !(lost > 0.0 && lost.is_finite()) {
         return Err(ParameterError::new_err(format!("lost must be a positive number of JOD, not {lost}")));
@@ -395,10 +315,11 @@ pub(crate) fn excess(
     if size != other {
         return Err(SizeError::new_err(format!("the pictures have different sizes, {size:?} and {other:?}")));
     }
+    let counts = counts.map(|counts| pixel_counts(counts, size)).transpose()?;
     let (a, b) = (a.copied(), b.copied());
     let denoised = denoised.map(|(a, b)| [a.copied(), b.copied()]);
     let (excess, warnings) =
-        py.detach(|| pool::run(|| compare(&oracle, &params, size, [a, b], denoised, lost, spp)))?;
+        py.detach(|| pool::run(|| compare(&oracle, &params, size, [a, b], denoised, lost, spp, counts)))?;
     for warning in warnings {
         let text = CString::new(warning.to_string())?;
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
@@ -406,6 +327,29 @@ pub(crate) fn excess(
     Ok(excess)
 }
 
+/// Of two pictures, with the fewest of each, of one that is as good as both, and the most.
+type Counts<'py> = (Plane<'py>, Plane<'py>, f32, f32, f32);
+type Plane<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
+
+fn pixel_counts(
+    (a, b, fewest, fewest_alone, most): Counts<'_>,
+    (width, height): (usize, usize),
+) -> PyResult<[PixelCounts; 2]> {
+    let counts = |plane: &Plane<'_>| {
+        let samples = plane.as_array();
+        if samples.dim() != (height, width) {
+            let message =
+                format!("counts of samples have the shape ({height}, {width}), not {:?}", samples.dim());
+            return Err(SizeError::new_err(message));
+        }
+        PixelCounts::new(samples.iter().copied().collect(), [fewest, fewest_alone, most]).ok_or_else(|| {
+            ParameterError::new_err("counts of samples are 0 or more, their limits above 0, and all finite")
+        })
+    };
+    Ok([counts(&a)?, counts(&b)?])
+}
+
+#[expect(clippy::too_many_arguments, reason = "as Python names them")]
 fn compare(
     oracle: &Oracle,
     params: &Params,
@@ -414,6 +358,7 @@ fn compare(
     denoised: Option<[Vec<Rgb>; 2]>,
     lost: f64,
     spp: f64,
+    counts: Option<[PixelCounts; 2]>,
 ) -> PyResult<(PyExcess, Vec<StillWarning>)> {
     let pair = PicturePair::new(size, pictures, spp).map_err(Raise::raise)?;
     let unfit = |error| match error {
@@ -422,14 +367,16 @@ fn compare(
         PairError::Judge(error) => PictureError::new_err(error.to_string()),
         other => CriterionError::new_err(other.to_string()),
     };
+    let counts = counts.as_ref().map(|counts| counts.each_ref());
     let (looked, left) = match denoised {
         None => {
-            let mut looked = pair.look(oracle, params, None).map_err(unfit)?;
+            let mut looked = pair.look(oracle, params, counts).map_err(unfit)?;
             let map = std::mem::take(&mut looked.map);
             (looked, Left::Map(map))
         }
         Some([a, b]) => {
-            let (error, looked) = DenoisedError::look(&pair, [&a, &b], lost, params, None).map_err(unfit)?;
+            let (error, looked) =
+                DenoisedError::look(&pair, [&a, &b], lost, params, counts).map_err(unfit)?;
             (looked, Left::Denoised(Box::new(error.of_shape_alone()), params.viewing))
         }
     };

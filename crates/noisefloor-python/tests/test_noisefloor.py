@@ -1186,19 +1186,19 @@ class Settings(unittest.TestCase):
 
     def test_the_threshold_of_a_renderer_is_found(self):
         params = nf.Params(tone_mapping="srgb")
-        tuning = nf.Tuning(threshold=(0.05, 0.0001))
-        while (each := tuning.next()) is not None:
+        search = nf.Search(threshold=(0.05, 0.0001))
+        for each in (look.each for look in search):
             found = nf.excess(self.noisy(1, each), self.noisy(2, each), params=params)
             self.assertEqual(found.map().shape, (128, 128))
             self.assertAlmostEqual(found.map().max(), found.ratio, places=5)
-            tuning.tell(found)
-        self.assertEqual(tuning.ending, "found")
+            search.tell(found)
+        self.assertEqual(search.ending, "found")
         # Each of the last two is enough. A mean of two is as good as one picture of half the variance
         other = nf.excess(
-            self.noisy(3, tuning.setting * 2**0.5), self.noisy(4, tuning.setting * 2**0.5), params=params
+            self.noisy(3, search.setting * 2**0.5), self.noisy(4, search.setting * 2**0.5), params=params
         )
         self.assertTrue(0.75 < other.ratio < 1.15, other)
-        self.assertEqual(tuning.steps[-1][1], found.ratio)
+        self.assertEqual(search.steps[-1][1], found.ratio)
         self.assertLessEqual(found.ratio * 2**0.5, 1)
 
     def test_noise_in_levels_and_plateaus_is_claimed_as_it_was_seen(self):
@@ -1208,44 +1208,41 @@ class Settings(unittest.TestCase):
                 def noise(threshold):
                     return level ** (np.floor(np.log(threshold) / np.log(level) - phase) + phase)
 
-                tuning = nf.Tuning(threshold=(0.2, 1e-4))
-                while (each := tuning.next()) is not None:
-                    tuning.tell(noise(each) / 2**0.5 / 0.03)
-                self.assertLessEqual(noise(tuning.setting), 0.03 * (1 + 1e-9), (level, phase, tuning.steps))
+                search = nf.Search(threshold=(0.2, 1e-4))
+                for each in (look.each for look in search):
+                    search.tell(noise(each) / 2**0.5 / 0.03)
+                self.assertLessEqual(noise(search.setting), 0.03 * (1 + 1e-9), (level, phase, search.steps))
         for above in (0.05, 0.03, 0.01):
-            tuning = nf.Tuning(threshold=(0.2, 0.001))
-            while (each := tuning.next()) is not None:
-                tuning.tell(nf.excess(*(self.noisy(seed, 2 * min(each, above)) for seed in (1, 2))))
-            self.assertEqual(tuning.ending, "found", tuning.steps)
+            search = nf.Search(threshold=(0.2, 0.001))
+            for each in (look.each for look in search):
+                search.tell(nf.excess(*(self.noisy(seed, 2 * min(each, above)) for seed in (1, 2))))
+            self.assertEqual(search.ending, "found", search.steps)
         # Where samples are known to follow, the mean of two speaks for one that is finer
-        tuning = nf.Tuning(threshold=(0.2, 0.001))
-        while (each := tuning.next()) is not None:
-            tuning.tell(each / 2**0.5 / 0.03, alone=each / 2**0.5 / 0.03)
-        self.assertTrue(0.029 < tuning.setting <= 0.03, tuning.steps)
+        search = nf.Search(threshold=(0.2, 0.001))
+        for each in (look.each for look in search):
+            search.tell(each / 2**0.5 / 0.03, alone=each / 2**0.5 / 0.03)
+        self.assertTrue(0.029 < search.setting <= 0.03, search.steps)
 
     def test_what_was_not_asked_for_is_not_told(self):
-        tuning = nf.Tuning(threshold=(0.2, 0.001))
+        search = nf.Search(threshold=(0.2, 0.001))
         with self.assertRaisesRegex(nf.ParameterError, "once"):
-            tuning.tell(1.0)
+            search.tell(1.0)
         for wrong in (float("nan"), -1.0):
-            tuning.next()
+            search.next()
             with self.assertRaisesRegex(nf.ParameterError, "0 or more"):
-                tuning.tell(wrong)
+                search.tell(wrong)
             with self.assertRaisesRegex(nf.ParameterError, "alone"):
-                tuning.tell(2.0, alone=wrong)
-        self.assertEqual(tuning.steps, [])
-        tuning.next()
-        tuning.tell(5.0)
+                search.tell(2.0, alone=wrong)
+        self.assertEqual(search.steps, [])
+        search.next()
+        search.tell(5.0)
         with self.assertRaisesRegex(nf.ParameterError, "once"):
-            tuning.tell(5.0)
-        tuning.next()
-        tuning.tell(0.0)
-        # Not what has failed, nor in between without a look
-        each = tuning.next()
-        tuning.tell(3.0)
-        self.assertTrue(tuning.ending == "found" and tuning.setting < each < 0.2, tuning.steps)
+            search.tell(5.0)
+        each = search.next().each
+        search.tell(0.0)
+        self.assertEqual((search.ending, search.setting), ("found", each))
         with self.assertRaisesRegex(nf.ParameterError, "end"):
-            tuning.tell(1.0)
+            search.tell(1.0)
 
     def test_crops_stand_for_a_large_picture_and_the_whole_is_looked_at_in_the_end(self):
         params, size = nf.Params(tone_mapping="srgb"), (512, 256)
@@ -1294,15 +1291,38 @@ class Settings(unittest.TestCase):
             self.assertTrue(worst[0] <= x < worst[0] + 64 and worst[1] <= y < worst[1] + 64, (found.place, worst))
         self.assertAlmostEqual(half.ratio, ratios[0] / 2)
 
+    def test_counts_of_samples_say_what_one_picture_leaves(self):
+        params = nf.Params(tone_mapping="srgb")
+
+        def excess(sigma, samples=None, limits=(16, 32, 64)):
+            counts = None if samples is None else (*[np.full((128, 128), samples)] * 2, *limits)
+            return nf.excess(self.noisy(1, sigma), self.noisy(2, sigma), params=params, counts=counts)
+
+        # Of two pictures with this noise, the mean is good enough, and neither alone
+        sigma = 0.85 * 0.02 / excess(0.02).ratio
+        self.assertTrue(0.72 < excess(sigma).ratio < 1)
+        endings = {}
+        for samples in (None, 16, 40, 64):
+            search = nf.Search(threshold=(0.2, 0.001))
+            search.next()
+            search.tell(excess(sigma, samples))
+            endings[samples] = search.ending
+        self.assertEqual(endings, {None: None, 16: "found", 40: "found", 64: "capped"})
+        with self.assertRaises(nf.SizeError):
+            nf.excess(self.noisy(1, 0.1), self.noisy(2, 0.1), counts=(np.ones((64, 128)), np.ones((64, 128)), 1, 1, 1))
+        for wrong in ((40, (0, 32, 64)), (float("nan"), (16, 32, 64))):
+            with self.assertRaisesRegex(nf.ParameterError, "counts"):
+                excess(0.1, *wrong)
+
     def test_ends_are_told_and_nonsense_is_refused(self):
-        tuning = nf.Tuning(samples=(16, 64))
-        while (each := tuning.next()) is not None:
-            self.assertEqual(each, tuning.next())
-            tuning.tell(100.0)
-        self.assertEqual((tuning.ending, tuning.setting), ("at-finest", None))
+        search = nf.Search(samples=(16, 64))
+        while (look := search.next()) is not None:
+            self.assertEqual(look.each, search.next().each)
+            search.tell(100.0)
+        self.assertEqual((search.ending, search.setting), ("at-finest", None))
         for bad in ({}, {"samples": (16, 4)}, {"threshold": (0.1, 0.2)}, {"samples": (3, 3)}, {"threshold": (1e308, 1e-308)}, {"samples": (2, 4), "threshold": (1, 0.1)}):
             with self.assertRaises(nf.ParameterError):
-                nf.Tuning(**bad)
+                nf.Search(**bad)
         picture = self.noisy(1, 0.1)
         with self.assertRaises(nf.PictureError):
             nf.excess(picture, picture)

@@ -35,14 +35,10 @@ pub struct AdaptivePicture {
 /// The samples of pixels that a renderer tells, with their limits, if they can be such.
 fn pixel_counts(limits: [f32; 3], payload: &[u8]) -> Result<PixelCounts, Blame> {
     let samples: Vec<f32> = rgb(payload).map(|[samples, ..]| samples).collect();
-    let [fewest, fewest_alone, most] = limits;
-    let possible = limits.iter().all(|&limit| limit.is_finite() && limit > 0.0)
-        && samples.iter().all(|&samples| samples.is_finite() && samples >= 0.0);
-    if possible {
-        return Ok(PixelCounts { samples, fewest, fewest_alone, most });
-    }
-    let what = format!("sample counts that cannot be, with the limits {limits:?}");
-    Err((None, SidecarCause::Wrong { what }))
+    PixelCounts::new(samples, limits).ok_or_else(|| {
+        let what = format!("sample counts that cannot be, with the limits {limits:?}");
+        (None, SidecarCause::Wrong { what })
+    })
 }
 
 /// A renderer in another process. Dropping it ends the process.

@@ -23,7 +23,7 @@ DENOISED = [("Combined", "RGBA", "Noisy Image"), ("Shadow Catcher", "RGB", "Nois
 COARSEST, FINEST = 0.2, 0.001
 # Edge of the cells in which squares of 64 pixels that overlap by half meet
 CELL = 32
-# What is aimed at, as a share of what may be seen, and the least step towards it; as noisefloor.Tuning does
+# What is aimed at, as a share of what may be seen, and the least step towards it; as noisefloor.Search does
 AIM, LEAST_STEP = 0.9, 1.25
 # Fewer samples are not worth a call of Cycles, which looks at its threshold after 16
 FEWEST = 16
@@ -80,7 +80,7 @@ class Frame:
         self.denoises = self.scene.cycles.use_denoising and depsgraph.view_layer_eval.cycles.use_denoising
         catches = any(instance.object.is_shadow_catcher for instance in depsgraph.object_instances)
         self.judge = judging.Judge(self.scene, shown, self.film, self.denoises, catches)
-        self.tuning = noisefloor.Tuning(threshold=(COARSEST, FINEST))
+        self.search = noisefloor.Search(threshold=(COARSEST, FINEST))
         self.halves = passes.Means(*self.size), passes.Means(*self.size)
         # The sum of 1/threshold² of the pictures that each cell has, and how far it is from what may be seen
         down, across = -(-self.size[1] // CELL), -(-self.size[0] // CELL)
@@ -150,7 +150,7 @@ class Frame:
 
     def _round(self, report):
         """Two more pictures of what is not good enough, and a verdict; returns why to end, if so."""
-        each = self.tuning.next()
+        each = self.search.next().each
         jobs = self._jobs(each)
         if not jobs:
             return "max-spp"
@@ -262,7 +262,7 @@ class Frame:
         if self.excess.ratio <= 1:
             return "found"
         # All samples together are the picture
-        self.tuning.tell(self.excess.ratio, alone=self.excess.ratio)
+        self.search.tell(self.excess.ratio, alone=self.excess.ratio)
         if self.on_gpu:
             known = sum(half.samples for half in self.halves)[..., 0] / 2
             self.rate = _of_cells(numpy.add, known) / CELL**2 / numpy.maximum(self.effort, 1)
@@ -270,7 +270,7 @@ class Frame:
         spp = sum(half.samples for half in self.halves)[..., 0]
         times = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2, numpy.ones((CELL, CELL)))
         self.expected = float((spp * times[: self.size[1], : self.size[0]]).sum())
-        return self.tuning.ending
+        return self.search.ending
 
     def _cancelled(self):
         """Whether Esc was hit."""

@@ -39,9 +39,9 @@ class State:
         self.shown = None
         # The thread that is about to ask which passes a render has, and of which scene, if that render is ours
         self.registering = None
-        # Of a search for the threshold: whether pictures are wanted, those of each layer, and how a render ended; and the search
-        # that is in progress in a window
-        self.wanted, self.rendered, self.ended, self.search = False, {}, None, None
+        # Of a search for the threshold: Cycles' settings by which pictures are wanted, those of each layer, and how a render
+        # ended; the search that is in progress in a window; and what the last one of each scene has tried
+        self.wanted, self.rendered, self.ended, self.search, self.tried = None, {}, None, None, {}
         # Seconds of the last frame of each scene, when what is rendered began, and frames since
         self.took, self.begun, self.frames = {}, 0.0, 0
 
@@ -106,6 +106,9 @@ def render(engine, depsgraph):
     if not wanted(engine, depsgraph):
         if not state.wanted or engine.is_preview:
             return original["render"](engine, depsgraph)
+        # A driver or keys may have set them otherwise
+        for name, value in state.wanted.items():
+            setattr(depsgraph.scene_eval.cycles, name, value)
         # Cycles frees what it has evaluated
         layer = depsgraph.view_layer_eval.name
         original["render"](engine, depsgraph)

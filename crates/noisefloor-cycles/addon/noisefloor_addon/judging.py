@@ -53,9 +53,9 @@ class Judge:
         light = picture[..., :3]
         return light + (1 - picture[..., 3:]) * BACKDROP if self.transparent else light
 
-    def excess(self, pair):
-        """How far the mean of two pictures, passes by name each, is from what may be seen; the time of the denoiser and
-        of the vision model."""
+    def excess(self, pair, counts=None):
+        """How far the mean of two pictures, passes by name each, is from what may be seen; counts: as noisefloor.excess has
+        them. Takes the time of the denoiser and of the vision model."""
         noisy = [self.seen(passes["Combined"]) for passes in pair]
         denoised = None
         if self.library:
@@ -64,7 +64,12 @@ class Judge:
             denoised = tuple(self.seen(made(passes)) for passes in pair)
         try:
             return noisefloor.excess(
-                *noisy, oracle=self.oracle, params=self.params, denoised=denoised, lost=self.settings.lost
+                *noisy,
+                oracle=self.oracle,
+                params=self.params,
+                denoised=denoised,
+                lost=self.settings.lost,
+                counts=counts,
             )
         except noisefloor.PictureError as error:
             if "identical" not in str(error):

@@ -32,7 +32,8 @@ class Settings(bpy.types.PropertyGroup):
     lost: bpy.props.FloatProperty(
         name="JOD Lost",
         description="What a denoised picture may lose in its worst place, in just-objectionable differences, by a model of "
-        "vision: 0.1 is hard to see even beside the perfect picture",
+        "vision. Of 100 people who are shown that place beside the perfect one, 58 prefer the perfect one at 0.3, and 53 "
+        "at 0.1, where 50 would by guessing; 75 do at 1",
         default=0.3,
         min=0.05,
         max=2.0,

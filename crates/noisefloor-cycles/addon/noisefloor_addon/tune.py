@@ -15,11 +15,12 @@ from . import compositor, denoise, display, frame, hooks, judging, sampling
 
 ENDINGS = {
     "at-finest": "even the finest threshold tried is not enough",
-    "unchanged": "a finer threshold changes nothing: Max Samples is reached first, raise it",
+    "unchanged": "a finer threshold changes nothing",
+    "capped": "what is wrong is in pixels that reach Max Samples: raise it, or turn caustics off",
     "not-falling": "more samples do not help: what is wrong is no noise",
 }
-# As many as noisefloor.Search asks for at the most
-CROPS = 4
+# As many as noisefloor.Search asks for at the most, and its longest step, in thresholds
+CROPS, LEAP = 4, 0.25
 BORDER = ["use_border", "use_crop_to_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y"]
 
 
@@ -58,7 +59,7 @@ class Search:
         self.look, self.whole, self.pictures, self.begun = None, {}, [], 0.0
         self.running, self.done = self._run(), False
         # Seconds so far, and of a sample, by the last picture, with its threshold, the samples of its pixels, and the fewest
-        self.spent, self.pace, self.counted, self.ending, self.stopped = 0.0, None, None, None, False
+        self.spent, self.pace, self.counted, self.stopped = 0.0, None, None, False
         # The fewest samples of a pixel: of each picture, of one that is as good as both, and as they were set
         self.fewest = None
         # Cycles loads the scene once for all of them
@@ -71,7 +72,6 @@ class Search:
 
     def _run(self):
         """The search, which yields where Blender is to render."""
-        full = False
         for self.look in self.search:
             if self.look.is_rendered:
                 x, y, width, height = self.look.crop
@@ -79,9 +79,6 @@ class Search:
                 whole = self.whole[self.look.view][1]
                 self._tell([{name: each[here] for name, each in picture.items()} for picture in whole])
                 continue
-            if full:
-                self.ending = "unchanged"
-                break
             if self.counted and (self.look.crop or self.look.each != self.counted[0]):
                 self.whole = {}
             for _ in range(2):
@@ -90,7 +87,6 @@ class Search:
                 self.pictures.append(self.take())
             pictures, self.pictures = self.pictures, []
             excess = self._tell(pictures)
-            full = all((picture[frame.COUNT] >= self.scene.cycles.samples).all() for picture in pictures)
             if self.look.crop is None:
                 self.whole[self.look.view] = excess.ratio, pictures
                 # So many crops lie in so many frames at the most
@@ -105,9 +101,8 @@ class Search:
             scene.frame_set(self.frames[self.look.view])
         cycles, shot = scene.cycles, scene.render
         # Both pictures together have the samples of one whose threshold is finer by √2, also where pixels have the fewest
-        single = self.fewest_of_one(self.look.each / math.sqrt(2))
-        each, setting = sampling.half(single)
-        self.fewest = each, single, setting
+        self.fewest = self.fewest_of(self.look.each)
+        setting = self.fewest[2]
         wanted = [
             (scene.noisefloor, "use", False),
             (cycles, "use_adaptive_sampling", True),
@@ -121,7 +116,7 @@ class Search:
         ]
         wanted += [(layer.cycles, "pass_debug_sample_count", True) for layer in layers]
         if self.denoised:
-            wanted += [(layer.cycles, "denoising_store_passes", True) for layer in layers]
+            wanted += [(layer.cycles, "denoising_store_passes", bool(self.judge.guides)) for layer in layers]
         owned = [(group, name) for group, name, _ in wanted] + [(shot, name) for name in BORDER]
         self.borrowed = [(group, name, getattr(group, name)) for group, name in owned]
         for group, name, value in wanted:
@@ -129,12 +124,13 @@ class Search:
         if self.look.crop:
             sampling.aim(shot, self.size, self.look.crop)
         # A render that was stopped may have left some
-        hooks.state.wanted, hooks.state.rendered = True, {}
+        hooks.state.wanted = {name: value for group, name, value in wanted if group is cycles}
+        hooks.state.rendered = {}
         self.begun = time.monotonic()
 
     def give_back(self):
         """Settings as they were."""
-        hooks.state.wanted = False
+        hooks.state.wanted = None
         for group, name, value in self.borrowed:
             setattr(group, name, value)
         self.borrowed = []
@@ -164,10 +160,16 @@ class Search:
 
     def _tell(self, pictures):
         """Judges two pictures, and tells the search."""
-        excess = self.judge.excess(pictures)
-        said, still = alone(excess, pictures, self.fewest[:2], self.scene.cycles.samples)
-        self.search.tell(excess, alone=said, still=still)
+        counts = (picture[frame.COUNT][..., 0] for picture in pictures)
+        excess = self.judge.excess(pictures, (*counts, *self.fewest[:2], self.scene.cycles.samples))
+        self.search.tell(excess)
         return excess
+
+    def fewest_of(self, each):
+        """The fewest samples of a pixel of each of two pictures, of one that is as good as both, and what is set for them."""
+        single = self.fewest_of_one(each / math.sqrt(2))
+        half, setting = sampling.half(single)
+        return half, single, setting
 
     def fewest_of_one(self, threshold):
         """Samples of a pixel of a picture with the user's own settings and this threshold."""
@@ -183,10 +185,22 @@ class Search:
         return mean * (crop[2] * crop[3] if crop else self.size[0] * self.size[1])
 
     def left(self):
-        """Seconds until this look is done, at about; None if nothing is known."""
+        """Seconds until the search has ended, at about, if noise falls as noise does; None if nothing is known."""
         if self.counted is None or self.look is None:
             return None
-        return self.pace * self.samples(self.look.each, self.fewest[0], self.look.crop) * (2 - len(self.pictures))
+        each, crop, samples = self.look.each, self.look.crop, 0.0
+        ratio = self.search.steps[-1][1] * each / math.sqrt(2) / self.search.steps[-1][0] if self.search.steps else 1.0
+        pictures = 2 - len(self.pictures)
+        while True:
+            samples += pictures * self.samples(each, self.fewest_of(each)[0], crop)
+            if not frame.AIM < ratio < math.inf or each <= frame.FINEST:
+                break
+            finer = max(frame.AIM / ratio, LEAP)
+            each, ratio, pictures = max(each * finer, frame.FINEST), ratio * finer, 2
+        if crop:
+            # In the end, the whole
+            samples += 2 * self.samples(each, self.fewest_of(each)[0], None)
+        return self.pace * samples
 
     def share(self):
         """How much of that has passed."""
@@ -204,15 +218,15 @@ class Search:
         if steps:
             text += f"; {steps[-1][0]:.3g} leaves {steps[-1][1]:.2f} times what may be seen"
         if left is not None:
-            text += f"; about {clock(left)} for this step"
+            text += f"; about {clock(left)} left"
         return text
 
     def finish(self):
         """Writes what was found into the scene; returns what it says."""
         if self.search.setting is None:
-            raise ValueError(ENDINGS[self.ending or self.search.ending])
-        cycles = self.scene.cycles
-        cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, self.search.setting
+            raise ValueError(ENDINGS[self.search.ending])
+        setting, cycles = self.search.setting, self.scene.cycles
+        cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, setting
         people = (
             "nobody would see what is wrong with the denoised picture, by the vision model"
             if self.denoised
@@ -222,42 +236,35 @@ class Search:
             people += f", frame {self.frames[self.search.views[0]]} is the hardest of {len(self.frames)}"
         if self.film:
             people += f", at {self.film:g} frames a second"
-        setting = self.search.setting
-        seconds = self.pace * self.samples(setting, self.fewest_of_one(setting), None)
-        people += f"; about {seconds:.0f} s a frame"
+        people += f"; about {self.seconds(setting):.0f} s a frame"
+        hooks.state.tried[self.scene.name] = self.tried()
+        if self.is_animated():
+            people += "; Noise Threshold has keys or a driver, which will set it otherwise: remove them"
         if compositor.denoises(self.scene) and not self.denoised:
             people += f"; {compositor.ADVICE}"
-        return f"{self.search.setting:.3g}: {people}"
+        return f"{setting:.3g}: {people}"
 
+    def seconds(self, setting):
+        """What a frame will take."""
+        return self.pace * self.samples(setting, self.fewest_of_one(setting), None)
 
-# Less of the noise than this follows the threshold where it is taken to stand still
-STILL = 0.12
+    def tried(self):
+        """Thresholds with what one picture leaves, over what may be seen, and its seconds, and whether it is the one that was
+        found: from coarse to fine."""
+        steps = sorted(self.search.steps)
+        if all(setting != self.search.setting for setting, _ in steps):
+            # Along the line between those that were looked at, in logarithms
+            logs = numpy.log(numpy.maximum(steps, 1e-9))
+            ratio = math.exp(numpy.interp(math.log(self.search.setting), *logs.T))
+            steps = sorted([*steps, (self.search.setting, ratio)])
+        return [(*step, self.seconds(step[0]), step[0] == self.search.setting) for step in reversed(steps)]
 
-
-def alone(excess, pictures, fewest, most):
-    """What is left in one picture whose threshold is finer by the root of two, over what may be seen, by the samples that pixels
-    have; and whether finer thresholds change next to nothing.
-
-    Where pixels have more than the fewest and less than the most, their noise follows the threshold, and that one picture is as
-    good as both. fewest: those of each of the two, and of that one."""
-    one, other = (picture["Combined"][..., :3] for picture in pictures)
-    bright = (one + other).mean(axis=-1) / 2
-    noise = ((one - other).mean(axis=-1) / (bright + bright.mean() + 1e-9)) ** 2
-    counts = [picture[frame.COUNT][..., 0] for picture in pictures]
-    follows = numpy.logical_or(*((count > fewest[0]) & (count < most) for count in counts))
-    at_most = numpy.logical_and(*(count >= most for count in counts))
-    # By how much the variance of that one is larger
-    larger = numpy.where(follows, 1.0, numpy.where(at_most, 2.0, 2.0 * fewest[0] / fewest[1]))
-
-    def of_square(x, y, width, height, ratio):
-        here = slice(y, y + height), slice(x, x + width)
-        strength = noise[here] / max(noise[here].sum(), 1e-30)
-        share = float(strength[follows[here]].sum())
-        # Of a picture without any noise, nothing is known
-        more = float((strength * larger[here]).sum()) if strength.any() else 2.0
-        return ratio * math.sqrt(more), share < STILL
-
-    return max(of_square(*square) for square in excess.squares())
+    def is_animated(self):
+        """Whether keys or a driver set the threshold otherwise than it was found."""
+        cycles, written = self.scene.cycles, self.scene.cycles.adaptive_threshold
+        self.scene.frame_set(self.scene.frame_current)
+        animated, cycles.adaptive_threshold = cycles.adaptive_threshold != written, written
+        return animated
 
 
 def clock(seconds):
@@ -366,6 +373,22 @@ def estimate(scene):
     return f"Takes two to three frames{about}"
 
 
+def draw_bar(row, share, text):
+    if hasattr(row, "progress"):  # Blender 4 and later
+        row.progress(factor=share, text=text)
+    else:
+        row.label(text=text)
+
+
+def draw_tried(column, scene):
+    """What a finer or a coarser threshold would leave, and take: bars are as long as a frame takes."""
+    tried = hooks.state.tried.get(scene.name, [])
+    longest = max((seconds for _, _, seconds, _ in tried), default=0)
+    for setting, ratio, seconds, found in tried:
+        left = f"{ratio * scene.noisefloor.lost:.2f} JOD lost" if scene.cycles.use_denoising else f"{ratio:.2f} of what may be seen"
+        draw_bar(column, seconds / max(longest, 1e-9), f"{setting:.3g}: {left}, {seconds:.0f} s{' (found)' if found else ''}")
+
+
 def draw(panel, context):
     """Beside Cycles' own field: for a still the loop first, for an animation the search."""
     scene = context.scene
@@ -380,11 +403,9 @@ def draw(panel, context):
         column.label(text=estimate(scene))
         if scene.timeline_markers:
             column.prop(scene.noisefloor, "frames")
+        draw_tried(column, scene)
     else:
-        if hasattr(row, "progress"):  # Blender 4 and later
-            row.progress(factor=search.share(), text=search.status().removeprefix("noisefloor: "))
-        else:
-            row.label(text=search.status())
+        draw_bar(row, search.share(), search.status().removeprefix("noisefloor: "))
         row.operator(RENDER_OT_noisefloor_stop.bl_idname, text="", icon="X")
     if compositor.denoises(scene) and not scene.cycles.use_denoising:
         column.label(text=compositor.ADVICE[0].upper() + compositor.ADVICE[1:], icon="INFO")

@@ -12,7 +12,7 @@ A renderer pushes samples into a Session, which names the tiles that need more a
     picture = session.image()
 
 check() tries a renderer before that, judge() judges finished pictures, metrics() compares two, and read()
-and write() know EXR and PNG files. Tuning finds a renderer's own noise threshold, or its samples, at which
+and write() know EXR and PNG files. Search finds a renderer's own noise threshold, or its samples, at which
 nobody sees noise. Pictures are arrays of shape (height, width, 3) with linear radiance,
 Rec. 709 primaries. C-contiguous float32 arrays are read where they lie; others are converted. Requests can
 be pickled, so that other processes can render. Every error is a noisefloor.Error.
@@ -43,7 +43,6 @@ from ._noisefloor import (
     Stop,
     Tile,
     ToneTable,
-    Tuning,
     Verdict,
     Viewing,
     __version__,
@@ -83,7 +82,6 @@ __all__ = [
     "Stop",
     "Tile",
     "ToneTable",
-    "Tuning",
     "Verdict",
     "Viewing",
     "check",

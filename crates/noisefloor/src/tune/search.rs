@@ -1,10 +1,10 @@
 //! A search over several pictures, or over parts of large ones.
 
-use super::{Ending, Excess, Next, Tuning};
+use super::{Ending, Excess, Knob, KnobError, Next, Tuning};
 use crate::tile::Tile;
 
 /// Edge of crops, in pixels: a square that is judged, and half of one around it.
-pub const CROP: usize = 128;
+const CROP: usize = 128;
 
 /// A picture that two seeds are to be rendered of, and judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,59 +23,35 @@ pub struct Look {
     pub is_rendered: bool,
 }
 
-/// Renders and judges the pictures that a search asks for. A closure that looks is one.
-pub trait Viewer {
-    /// Why pictures cannot be rendered or judged.
-    type Error;
-
-    /// Renders two pictures with [`Look::each`], each with a seed of its own and the same seeds in every step. Returns what was
-    /// found in the worst place, and in the [`squares`](super::squares) of the picture if crops are wanted.
-    ///
-    /// # Errors
-    /// They end the search.
-    fn look(&mut self, look: &Look) -> Result<(Excess, Vec<(Tile, f64)>), Self::Error>;
-
-    /// All looks with one setting are done, for now.
-    ///
-    /// # Errors
-    /// They end the search.
-    fn step(&mut self, _search: &Search) -> Result<(), Self::Error> {
-        Ok(())
-    }
-}
-
-impl<E, F: FnMut(&Look) -> Result<(Excess, Vec<(Tile, f64)>), E>> Viewer for F {
-    type Error = E;
-
-    fn look(&mut self, look: &Look) -> Result<(Excess, Vec<(Tile, f64)>), E> {
-        self(look)
-    }
-}
-
-/// Runs a search to its end.
+/// Runs a search to its end. `look` renders two pictures with [`Look::each`], each with a seed of its own and the same seeds in
+/// every step, and returns what was found in the worst place, and in the [squares](super::Looked::squares) of the picture if
+/// crops are wanted.
 ///
 /// ```
-/// use noisefloor::tune::{Ending, Excess, Knob, Look, Search, Tuning, drive};
+/// use noisefloor::tune::{Ending, Excess, Knob, Search, drive};
 ///
-/// let tuning = Tuning::new(Knob::Threshold { coarsest: 0.1, finest: 0.001 })?;
-/// let mut search = Search::new(tuning, 1, 0);
-/// // A renderer whose noise is seen as soon as its threshold is above 0.03
-/// let mut look = |look: &Look| Ok::<_, std::io::Error>((Excess::new(look.setting / 0.03), Vec::new()));
-/// let ending = drive(&mut search, &mut look)?;
-/// assert!(matches!(ending, Ending::Found { setting, .. } if setting <= 0.03));
+/// let mut search = Search::new(Knob::Threshold { coarsest: 0.1, finest: 0.001 })?.with_views(3);
+/// // The frame with number 1 is the hardest
+/// let enough = [0.05, 0.02, 0.04];
+/// let ending = drive(&mut search, |look| {
+///     Ok::<_, std::io::Error>((Excess::new(look.setting / enough[look.view]), Vec::new()))
+/// })?;
+/// assert_eq!(search.views(), [1, 2, 0]);
+/// assert!(matches!(ending, Ending::Found { setting, .. } if setting > 0.01 && setting <= 0.02));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
-/// Those of `viewer`. The search can go on afterwards.
-pub fn drive<V: Viewer + ?Sized>(search: &mut Search, viewer: &mut V) -> Result<Ending, V::Error> {
-    while let Some(look) = search.next() {
-        let (excess, squares) = viewer.look(&look)?;
-        if search.tell(excess, &squares) {
-            viewer.step(search)?;
-        }
+/// Those of `look`. The search can go on afterwards.
+pub fn drive<E>(
+    search: &mut Search,
+    mut look: impl FnMut(&Look) -> Result<(Excess, Vec<(Tile, f64)>), E>,
+) -> Result<Ending, E> {
+    while let Some(next) = search.next() {
+        let (excess, squares) = look(&next)?;
+        search.tell(excess, &squares);
     }
-    match search.tuning().next() {
+    match search.tuning.next() {
         Next::Done(ending) => Ok(ending),
         Next::Render { .. } => unreachable!("a search that asks for nothing has ended"),
     }
@@ -107,27 +83,11 @@ enum Purpose {
     Again,
 }
 
-/// A [`Tuning`] over one or several views.
+/// A search of a renderer's setting in one or several views.
 ///
 /// With the first setting, the search looks at all views as a whole. With later settings, it begins with the hardest view and
 /// stops at the first one that fails. In large views, crops around the worst squares can stand for the whole. The setting that is
 /// enough for the crops is then tried on the whole view; if it fails there, the search goes on in other crops.
-///
-/// ```
-/// use noisefloor::tune::{Ending, Excess, Knob, Next, Search, Tuning};
-///
-/// let tuning = Tuning::new(Knob::Threshold { coarsest: 0.1, finest: 0.001 })?;
-/// let mut search = Search::new(tuning, 3, 0);
-/// while let Some(look) = search.next() {
-///     // The frame with number 1 is the hardest
-///     let enough = [0.05, 0.02, 0.04][look.view];
-///     search.tell(Excess::new(look.setting / enough), &[]);
-/// }
-/// assert_eq!(search.views(), [1, 2, 0]);
-/// let Next::Done(Ending::Found { setting, .. }) = search.tuning().next() else { panic!() };
-/// assert!(setting > 0.01 && setting <= 0.02);
-/// # Ok::<(), noisefloor::tune::KnobError>(())
-/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
     tuning: Tuning,
@@ -143,13 +103,40 @@ pub struct Search {
 }
 
 impl Search {
-    /// A search over this number of `views`, for which at most this number of `crops` stand; 0 for none. A tuning that has
-    /// steps is continued.
-    pub fn new(tuning: Tuning, views: usize, crops: usize) -> Self {
-        let purpose = if tuning.steps().is_empty() { Purpose::First } else { Purpose::Step };
-        let views: Vec<usize> = (0..views.max(1)).collect();
-        let places = views.iter().map(|&view| Place { view, crop: None }).collect();
-        Self { tuning, crops, purpose, places, seen: Vec::new(), views, stood: Vec::new() }.ordered(&[])
+    /// A search that has not begun, in one view as a whole.
+    ///
+    /// # Errors
+    /// [`KnobError`] if the range is empty.
+    pub fn new(knob: Knob) -> Result<Self, KnobError> {
+        let (tuning, places, stood) = (Tuning::new(knob)?, Vec::new(), Vec::new());
+        let search = Self {
+            tuning,
+            crops: 0,
+            purpose: Purpose::First,
+            places,
+            seen: Vec::new(),
+            views: vec![0],
+            stood,
+        };
+        Ok(search.ordered(&[]))
+    }
+
+    /// The same over this number of views, such as frames of a sequence: 1 at the least.
+    #[must_use]
+    pub fn with_views(self, views: usize) -> Self {
+        Self { views: (0..views.max(1)).collect(), ..self }.ordered(&[])
+    }
+
+    /// The same where at most this number of crops stand for a view; 0 for none.
+    #[must_use]
+    pub fn with_crops(self, crops: usize) -> Self {
+        Self { crops, ..self }
+    }
+
+    /// As many crops as stand for a picture of this size, if they are to have no more than a third of its pixels: 4 at most, 0
+    /// if it is small.
+    pub fn crops_for((width, height): (usize, usize)) -> usize {
+        (width.saturating_mul(height) / (3 * CROP * CROP)).min(4)
     }
 
     /// The same with these views first, in this order: hardest first, as found by an earlier search.
@@ -160,9 +147,33 @@ impl Search {
         self
     }
 
-    /// The search of the setting.
-    pub fn tuning(&self) -> &Tuning {
-        &self.tuning
+    /// Takes over a step of an earlier search: its setting, and what was found. Returns whether this search would have tried the
+    /// same, and has taken it; with another range, it may go another way from some step on.
+    pub fn repeat(&mut self, setting: f64, excess: Excess) -> bool {
+        let tries_it = matches!(self.tuning.next(), Next::Render { setting: tried, .. } if tried == setting);
+        if tries_it {
+            self.tuning.tell(excess);
+            self.purpose = Purpose::Step;
+        }
+        tries_it
+    }
+
+    /// What is searched.
+    pub fn knob(&self) -> Knob {
+        self.tuning.knob
+    }
+
+    /// What was tried, in order: each [`Look::setting`], with what was found in the worst place.
+    pub fn steps(&self) -> impl DoubleEndedIterator<Item = (f64, Excess)> {
+        self.tuning.steps.iter().map(|step| (step.setting, step.excess))
+    }
+
+    /// How it ended; `None` before that.
+    pub fn ending(&self) -> Option<Ending> {
+        match (self.next(), self.tuning.next()) {
+            (None, Next::Done(ending)) => Some(ending),
+            _ => None,
+        }
     }
 
     /// All views, hardest first as far as it is known.
@@ -177,10 +188,10 @@ impl Search {
 
     /// What to look at next; `None` at the end. The same until [`Search::tell`].
     pub fn next(&self) -> Option<Look> {
-        let (each, setting) = match (self.purpose, self.tuning.next(), self.tuning.steps().last()) {
+        let (each, setting) = match (self.purpose, self.tuning.next(), self.tuning.steps.last()) {
             // The mean of two is as good as one with the setting that was enough alone in the crops
             (Purpose::Again, Next::Done(Ending::Found { setting, .. }), _) => {
-                (self.tuning.knob().of_each(setting), setting)
+                (self.knob().of_each(setting), setting)
             }
             (Purpose::Closer { .. }, _, Some(last)) => (last.each, last.setting),
             (_, Next::Render { each, setting }, _) => (each, setting),
@@ -192,7 +203,7 @@ impl Search {
     }
 
     /// Reports the look that [`Search::next`] asked for: the worst place, and, if crops are wanted, all
-    /// [`squares`](super::squares) of the picture. Returns whether it was the last look with this setting, for now. After the
+    /// [squares](super::Looked::squares) of the picture. Returns whether it was the last look with this setting, for now. After the
     /// end, nothing happens.
     pub fn tell(&mut self, excess: Excess, squares: &[(Tile, f64)]) -> bool {
         let Some(look) = self.next() else { return true };
@@ -218,6 +229,7 @@ impl Search {
         // What is worst in two pictures need not be worst in one
         let finer = seen.iter().map(|seen| seen.excess.of_finer()).fold(0.0, f64::max);
         excess.alone = excess.alone.map(|_| finer);
+        excess.floor = seen.iter().map(|seen| seen.excess.floor).fold(0.0, f64::max);
         match self.purpose {
             Purpose::First => {
                 let crops = self.choose(&seen);
@@ -231,7 +243,7 @@ impl Search {
                 self.go_on(&seen);
             }
             Purpose::Closer { worst } => {
-                if self.tuning.steps().is_empty() {
+                if self.tuning.steps.is_empty() {
                     // What is seen in the whole is there
                     excess.ratio = excess.ratio.max(worst);
                     self.tuning.tell(excess);
@@ -316,12 +328,6 @@ impl Search {
     }
 }
 
-/// As many crops as stand for a picture of this size, if they are to have no more than a third of its pixels: 4 at most, 0
-/// if it is small.
-pub fn crops_for((width, height): (usize, usize)) -> usize {
-    (width.saturating_mul(height) / (3 * CROP * CROP)).min(4)
-}
-
 /// Those, each once, and then the others.
 fn first<T: Copy + PartialEq>(those: impl Iterator<Item = T>, others: &[T]) -> Vec<T> {
     let mut all = Vec::with_capacity(others.len());
@@ -335,7 +341,7 @@ fn first<T: Copy + PartialEq>(those: impl Iterator<Item = T>, others: &[T]) -> V
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Knob, squares};
+    use super::super::squares;
     use super::*;
     use proptest::prelude::*;
     use std::f64::consts::SQRT_2;
@@ -348,7 +354,7 @@ mod tests {
 
     /// The looks of a search, and how it ended.
     fn search(views: usize, crops: usize, law: Law<'_>) -> (Vec<Look>, Search) {
-        let mut search = Search::new(Tuning::new(KNOB).unwrap(), views, crops);
+        let mut search = Search::new(KNOB).unwrap().with_views(views).with_crops(crops);
         let mut looks = Vec::new();
         while let Some(look) = search.next() {
             looks.push(look);
@@ -370,7 +376,7 @@ mod tests {
     }
 
     fn enough(search: &Search) -> f64 {
-        let Next::Done(Ending::Found { setting, .. }) = search.tuning().next() else { panic!("{search:?}") };
+        let Some(Ending::Found { setting, .. }) = search.ending() else { panic!("{search:?}") };
         setting
     }
 
@@ -421,14 +427,13 @@ mod tests {
 
     #[test]
     fn an_earlier_search_goes_on_with_the_views_in_its_order() {
-        let mut tuning = Tuning::new(KNOB).unwrap();
-        tuning.tell(Excess::new(4.0));
-        let mut search = Search::new(tuning, 3, 0).ordered(&[2, 7]);
+        let mut search = Search::new(KNOB).unwrap().with_views(3).ordered(&[2, 7]);
+        assert!(!search.repeat(0.3, Excess::new(4.0)) && search.repeat(0.2, Excess::new(4.0)));
         assert_eq!(search.views(), [2, 0, 1]);
         let look = search.next().unwrap();
         assert!(look.view == 2 && look.setting < 0.2);
         assert!(search.tell(Excess::new(2.0), &[]));
-        assert_eq!(search.tuning().steps()[1].excess.ratio, 2.0);
+        assert_eq!(search.steps().map(|(_, excess)| excess.ratio).collect::<Vec<_>>(), [4.0, 2.0]);
     }
 
     #[test]
@@ -436,10 +441,10 @@ mod tests {
         for (size, crops) in
             [((240, 135), 0), ((320, 180), 1), ((480, 270), 2), ((960, 540), 4), ((1920, 1080), 4)]
         {
-            assert_eq!(crops_for(size), crops);
+            assert_eq!(Search::crops_for(size), crops);
             assert!(crops * CROP * CROP * 3 <= size.0 * size.1);
         }
-        assert_eq!(crops_for((usize::MAX, 2)), 4);
+        assert_eq!(Search::crops_for((usize::MAX, 2)), 4);
     }
 
     proptest! {
@@ -458,13 +463,11 @@ mod tests {
             let t = enough(&found);
             if crops == 0 {
                 // What was told can be told again, as when a search is resumed
-                let mut again = Tuning::new(KNOB).unwrap();
-                for step in found.tuning().steps() {
-                    let Next::Render { setting, .. } = again.next() else { panic!("{again:?}") };
-                    prop_assert_eq!(setting, step.setting);
-                    again.tell(step.excess);
+                let mut again = Search::new(KNOB).unwrap().with_views(views);
+                for (setting, excess) in found.steps() {
+                    prop_assert!(again.repeat(setting, excess));
                 }
-                prop_assert_eq!(again.next(), found.tuning().next());
+                prop_assert_eq!(again.ending(), found.ending());
             }
             for view in 0..views {
                 for square in squares(SIZE) {

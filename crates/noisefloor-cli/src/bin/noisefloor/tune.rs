@@ -9,10 +9,11 @@ pub use job::{TuneCriterion, TuneJob};
 use crate::tune::job::{Row, TILE};
 use crate::tune::keep::{Keep, KeptSearch};
 use crate::tune::pictures::{Crop, Judged, Judges, Pair, View};
+use anyhow::Context;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{CROP, Ending, Excess, Look, Next, Search, Viewer, drive};
+use noisefloor::tune::{Ending, Excess, Look, Search};
 use noisefloor::{Params, Tile, ToneMapping};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::say::{note, say, say_json};
@@ -61,9 +62,15 @@ pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
     let mut tune = Tune::begin(&job, keep)?;
     let mut search = match (&tune.keep, job.earlier) {
         (Some(keep), Earlier::Resume) => tune.resume(keep.earlier(&tune.identity)?)?,
-        _ => Search::new(job.tuning.clone(), tune.views.len(), job.regions),
+        _ => job.search.clone(),
     };
-    let ending = drive(&mut search, &mut tune)?;
+    while let Some(look) = search.next() {
+        let (excess, squares) = tune.look(&look)?;
+        if search.tell(excess, &squares) {
+            tune.step(&search)?;
+        }
+    }
+    let ending = search.ending().context("the search asks for nothing, and has not ended")?;
     let report = tune.report(&search, Some(ending));
     if let Some(keep) = &tune.keep {
         keep.write_report(&report)?;
@@ -123,13 +130,12 @@ impl<'a> Tune<'a> {
     fn resume(&mut self, kept: Option<KeptSearch>) -> anyhow::Result<Search> {
         let job = self.job;
         let (steps, frames) = kept.map(|kept| (kept.steps, kept.frames)).unwrap_or_default();
-        let mut tuning = job.tuning.clone();
+        let mut search = job.search.clone();
         for row in steps {
             // With another --from or --to, the search may go another way from some step on
-            if !matches!(tuning.next(), Next::Render { setting, .. } if setting == row.setting) {
+            if !search.repeat(row.setting, row.excess()) {
                 break;
             }
-            tuning.tell(row.excess());
             if !job.quiet && !job.json {
                 say_step(job, &row)?;
             }
@@ -137,22 +143,18 @@ impl<'a> Tune<'a> {
         }
         let number = |frame: &i32| self.views.iter().position(|view| view.frame == Some(*frame));
         let hardest: Vec<usize> = frames.iter().filter_map(number).collect();
-        Ok(Search::new(tuning, self.views.len(), job.regions).ordered(&hardest))
+        Ok(search.ordered(&hardest))
     }
-}
-
-impl Viewer for Tune<'_> {
-    type Error = anyhow::Error;
 
     fn look(&mut self, look: &Look) -> anyhow::Result<(Excess, Vec<(Tile, f64)>)> {
         let job = self.job;
         let view = &mut self.views[look.view];
-        let mut what = format!("{} {}", job.tuning.knob().name(), look.setting);
+        let mut what = format!("{} {}", job.search.knob().name(), look.setting);
         if let Some(frame) = view.frame {
             what += &format!(", frame {frame}");
         }
         if let Some(crop) = look.crop {
-            what += &format!(", around ({}, {})", crop.x + CROP / 2, crop.y + CROP / 2);
+            what += &format!(", around ({}, {})", crop.x + crop.width / 2, crop.y + crop.height / 2);
         }
         let bar = spinner(job.quiet, format!("{what}: two pictures"));
         let start = Instant::now();
@@ -195,14 +197,14 @@ impl Viewer for Tune<'_> {
         self.whole.clear();
         let Some((look, judged)) = self.worst.take() else { return Ok(()) };
         // The last look at the whole, after crops, is no step of the search if it passes
-        let step = search.tuning().steps().last().filter(|step| step.each == look.each);
-        let told = step.map_or(judged.looked.excess, |step| step.excess);
+        let step = search.steps().next_back().filter(|(setting, _)| *setting == look.setting);
+        let told = step.map_or(judged.looked.excess, |(_, excess)| excess);
         self.rows.push(Row {
             setting: look.setting,
             each: look.each,
             ratio: told.ratio.is_finite().then_some(told.ratio),
             alone: told.alone.filter(|alone| alone.is_finite()),
-            still: told.still,
+            floor: told.floor,
             frame: self.views[look.view].frame,
             x: judged.looked.excess.place.map(|(x, _)| x),
             y: judged.looked.excess.place.map(|(_, y)| y),
@@ -220,9 +222,7 @@ impl Viewer for Tune<'_> {
         }
         Ok(())
     }
-}
 
-impl Tune<'_> {
     /// Those of a sequence, worst first.
     fn frames(&self, search: &Search) -> Vec<i32> {
         search.views().iter().filter_map(|&view| self.views[view].frame).collect()
@@ -235,7 +235,7 @@ impl Tune<'_> {
         };
         let ending = ending.map_or("searching", |ending| ending.name());
         Report {
-            knob: search.tuning().knob().name(),
+            knob: search.knob().name(),
             setting,
             too_coarse,
             ending,
@@ -257,7 +257,7 @@ impl Row {
     fn excess(&self) -> Excess {
         let ratio = self.ratio.unwrap_or(f64::INFINITY);
         let excess = Excess::new(ratio).at(self.x.zip(self.y)).of_pictures(self.pictures);
-        excess.with_alone(self.alone).with_still(self.still)
+        excess.with_alone(self.alone).with_floor(self.floor)
     }
 }
 
@@ -284,7 +284,7 @@ fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
     if row.crops > 0 {
         at += ", looked at in crops";
     }
-    let name = job.tuning.knob().name();
+    let name = job.search.knob().name();
     Ok(say!("{name} {}: {what}, at worst{at}; {:.1} s", row.setting, row.seconds + row.judging_seconds)?)
 }
 
@@ -297,7 +297,7 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
     {
         return Ok(say!("{setting}")?);
     }
-    let name = job.tuning.knob().name();
+    let name = job.search.knob().name();
     match ending {
         Ending::Found { setting, too_coarse: None } => {
             say!("{name} {setting}: the coarsest tried is enough; --from tries coarser ones")?
@@ -314,6 +314,10 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
              the renderer does not look at the {name}, or has reached its most samples (--max-spp), \
              or takes its fewest samples with all of them (--to tries finer ones)",
             report.steps.last().map_or(0.0, |step| step.each)
+        ),
+        Ending::Capped { ratio } => note!(
+            "error: {ratio:.2} times too much is left, mostly by pixels that have the most samples: \
+             a finer {name} cannot help them; --max-spp allows for more"
         ),
         Ending::NotFalling { ratio } => note!(
             "error: more samples do not make it better ({ratio:.2} times too much): \

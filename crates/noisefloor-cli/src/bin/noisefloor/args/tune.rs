@@ -4,7 +4,7 @@ use super::render::rate;
 use crate::tune::{KnobChoice, TuneCriterion, TuneJob};
 use clap::Args;
 use noisefloor::Audience;
-use noisefloor::tune::{Knob, Tuning};
+use noisefloor::tune::{Knob, Search};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::denoiser::DenoiserChoice;
 use noisefloor_cli::options::eyes::EyesArgs;
@@ -186,8 +186,8 @@ impl TuneArgs {
                 most: whole("--to", self.to, 16_384)?,
             },
         };
-        let tuning = match Tuning::new(knob) {
-            Ok(tuning) => tuning,
+        let search = match Search::new(knob) {
+            Ok(search) => search.with_crops(self.regions.unwrap_or(0) as usize),
             Err(error) => refuse!("--from, --to: {error}"),
         };
         let (criterion, viewing, audience) = if self.denoise.is_some() {
@@ -224,12 +224,13 @@ impl TuneArgs {
         if let TuneCriterion::Noise(oracle) = &criterion {
             judged_by(Some(viewing), oracle)?;
         }
+        let frames: Vec<i32> = self.frames.iter().flat_map(Frames::iter).collect();
         Ok(TuneJob {
             source,
-            frames: self.frames.iter().flat_map(Frames::iter).collect(),
+            search: search.with_views(frames.len()),
+            frames,
             regions: self.regions.unwrap_or(0) as usize,
             resources,
-            tuning,
             most_spp: self.max_spp,
             criterion,
             tone,

@@ -1,6 +1,6 @@
 //! What `tune` is to find, and what it notes of each step.
 
-use noisefloor::tune::Tuning;
+use noisefloor::tune::Search;
 use noisefloor::{Audience, Oracle, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::tone::Tone;
@@ -20,7 +20,8 @@ pub struct TuneJob {
     /// Crops that are rendered after the first setting; 0 for the whole picture.
     pub regions: usize,
     pub resources: Resources,
-    pub tuning: Tuning,
+    /// That has not begun.
+    pub search: Search,
     /// Most samples per pixel of a picture with a threshold.
     pub most_spp: Option<u64>,
     pub criterion: TuneCriterion,
@@ -50,12 +51,12 @@ pub struct Row {
     pub(super) each: f64,
     /// What is wrong in the worst place, over what may be; null where it cannot be told.
     pub(super) ratio: Option<f64>,
-    /// The same of one picture whose threshold is finer by √2, and whether that changes next to nothing; where the renderer
+    /// The same of one picture whose threshold is finer by √2, and that below which no finer threshold gets; where the renderer
     /// tells how many samples pixels have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) alone: Option<f64>,
     #[serde(default)]
-    pub(super) still: bool,
+    pub(super) floor: f64,
     /// The worst place, and the frame of a sequence that has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) frame: Option<i32>,

@@ -90,7 +90,7 @@ pub struct View {
 impl View {
     pub fn open(job: &TuneJob, frame: Option<i32>, judges: &mut Judges<'_>) -> anyhow::Result<Self> {
         let source = frame.map_or_else(|| job.source.clone(), |frame| job.source.of_frame(frame));
-        let mut pictures = Pictures::open(&source, job.resources, job.tuning.knob(), job.most_spp)?;
+        let mut pictures = Pictures::open(&source, job.resources, job.search.knob(), job.most_spp)?;
         let guides = match &mut judges.denoiser {
             Some(denoiser) => pictures.guides(source.first_hits_spp(), denoiser)?,
             None => None,
@@ -132,7 +132,7 @@ impl View {
             TuneCriterion::Denoised { .. } => String::new(),
         };
         let tone = serde_json::to_string(&job.tone.absolute()?)?;
-        let (knob, said, most) = (job.tuning.knob().name(), judges.said(), job.most_spp.unwrap_or(0));
+        let (knob, said, most) = (job.search.knob().name(), judges.said(), job.most_spp.unwrap_or(0));
         let audience = serde_json::to_string(&job.audience)?;
         let seeds = seeds(self.source.seed);
         Ok(identity
