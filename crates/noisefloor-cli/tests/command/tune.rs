@@ -74,6 +74,16 @@ fn frames_of_a_film_need_fewer_samples() {
     assert_eq!(tune(&["--viewing", "desk,fps=24"]), film);
     let said = succeed(&["tune", "cornell-box", "--size", "64x64", "--fps", "24"]);
     assert!(said.contains("fps=24") && said.contains("come from stills"), "{said}");
+    // What other settings would leave and take, with the one that was found: more samples leave less, and take longer
+    let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let table: Vec<Vec<String>> = said.lines().filter(|line| line.contains('▇')).map(words).collect();
+    let numbers =
+        |at: usize| table.iter().map(|line| line[line.len() - at].parse().unwrap()).collect::<Vec<f64>>();
+    let (spp, left, seconds) = (numbers(4), numbers(3), numbers(2));
+    assert!(spp.is_sorted() && seconds.is_sorted() && left.is_sorted_by(|a, b| a >= b), "{said}");
+    assert!(spp.len() > 1 && left[0] > 1.0, "{said}");
+    let found = table.iter().filter(|line| line[0] == ">").map(|line| line[1].clone()).collect::<Vec<_>>();
+    assert_eq!(found, [film.to_string()], "{said}");
     fail(&["tune", "--fps", "24", "--viewing", "desk,fps=25"], &["either --fps"]);
     fail(&["tune", "--fps", "4"], &["10…1000 frames per second"]);
 }

@@ -13,7 +13,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
-use noisefloor::tune::{Ending, Excess, Look, Search};
+use noisefloor::tune::{Ending, Excess, Knob, Look, Search};
 use noisefloor::{Params, Tile, ToneMapping};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::say::{note, say, say_json};
@@ -97,6 +97,8 @@ struct Tune<'a> {
     worst: Option<(Look, Judged)>,
     rendering: Duration,
     judging: Duration,
+    /// How many were rendered.
+    rendered: usize,
 }
 
 impl<'a> Tune<'a> {
@@ -123,6 +125,7 @@ impl<'a> Tune<'a> {
             worst: None,
             rendering: Duration::ZERO,
             judging: Duration::ZERO,
+            rendered: 0,
         })
     }
 
@@ -167,6 +170,7 @@ impl<'a> Tune<'a> {
             view.check_size(&pair)?;
         }
         self.rendering += start.elapsed();
+        self.rendered += usize::from(!look.is_rendered);
         bar.set_message(format!("{what}: judging"));
         let start = Instant::now();
         let whole = (look.crop.is_none() && job.regions > 0).then(|| pair.clone());
@@ -211,6 +215,7 @@ impl<'a> Tune<'a> {
             crops: if look.crop.is_some() { job.regions } else { 0 },
             pictures: told.pictures,
             seconds: std::mem::take(&mut self.rendering).as_secs_f64(),
+            views: std::mem::take(&mut self.rendered).max(1),
             judging_seconds: std::mem::take(&mut self.judging).as_secs_f64(),
         });
         if !job.quiet && !job.json {
@@ -288,6 +293,65 @@ fn say_step(job: &TuneJob, row: &Row) -> anyhow::Result<()> {
     Ok(say!("{name} {}: {what}, at worst{at}; {:.1} s", row.setting, row.seconds + row.judging_seconds)?)
 }
 
+/// A setting, with what one picture leaves and the seconds that it takes.
+#[derive(Clone, Copy)]
+struct Tried {
+    setting: f64,
+    ratio: f64,
+    seconds: f64,
+}
+
+impl Tried {
+    /// Of one that lies between two, along the line in logarithms.
+    fn between(setting: f64, [a, b]: [Self; 2]) -> Self {
+        let share = (setting / a.setting).ln() / (b.setting / a.setting).ln();
+        let at = |a: f64, b: f64| a * (b / a).powf(share);
+        Self { setting, ratio: at(a.ratio, b.ratio), seconds: at(a.seconds, b.seconds) }
+    }
+}
+
+/// What whole pictures leave and take with the settings that were tried, from coarse to fine, and with the one that was found.
+fn tried(knob: Knob, steps: &[Row], found: Option<f64>) -> Vec<Tried> {
+    let mut so_far = 0.0;
+    let mut all: Vec<Tried> = Vec::new();
+    for row in steps.iter().filter(|row| row.crops == 0) {
+        // Two pictures together are as good as one; with samples, they grow
+        let seconds = row.seconds / row.views as f64;
+        so_far = if matches!(knob, Knob::Samples { .. }) { so_far + seconds } else { seconds };
+        let Some(ratio) = row.ratio else { continue };
+        all.push(Tried { setting: row.setting, ratio, seconds: so_far });
+    }
+    all.sort_by(|a, b| match knob {
+        Knob::Samples { .. } => a.setting.total_cmp(&b.setting),
+        _ => b.setting.total_cmp(&a.setting),
+    });
+    if let Some(found) = found
+        && let Some(at) = all.windows(2).position(|two| (two[0].setting > found) != (two[1].setting > found))
+        && all.iter().all(|tried| tried.setting != found)
+    {
+        all.insert(at + 1, Tried::between(found, [all[at], all[at + 1]]));
+    }
+    all
+}
+
+/// As a table, with a bar as long as a picture takes.
+fn say_tried(job: &TuneJob, report: &Report) -> anyhow::Result<()> {
+    const LONGEST: f64 = 40.0;
+    let all = tried(job.search.knob(), &report.steps, report.setting);
+    let most = all.iter().map(|tried| tried.seconds).fold(f64::MIN_POSITIVE, f64::max);
+    let (left, unit) = match &job.criterion {
+        TuneCriterion::Noise(_) => ("noise left", 1.0),
+        TuneCriterion::Denoised { lost, .. } => ("JOD lost", *lost),
+    };
+    say!("  {:>10} {left:>11} {:>8}", report.knob, "seconds")?;
+    for Tried { setting, ratio, seconds } in all {
+        let mark = if report.setting == Some(setting) { '>' } else { ' ' };
+        let bar = "▇".repeat((seconds / most * LONGEST).ceil() as usize);
+        say!("{mark} {setting:>10} {:>11.2} {seconds:>8.1} {bar}", ratio * unit)?;
+    }
+    Ok(())
+}
+
 fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()> {
     if job.json {
         return say_json(report);
@@ -332,7 +396,7 @@ fn say_all(job: &TuneJob, report: &Report, ending: Ending) -> anyhow::Result<()>
         let pictures = if many { "the last pictures" } else { "the last two pictures" };
         say!("{}; {:.0} s, of which {pictures} took {last:.0} s", report.judged, report.seconds)?;
     }
-    Ok(())
+    say_tried(job, report)
 }
 
 fn spinner(quiet: bool, message: String) -> ProgressBar {

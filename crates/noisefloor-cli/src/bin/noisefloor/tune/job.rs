@@ -67,7 +67,13 @@ pub struct Row {
     pub(super) crops: usize,
     /// Follows from the pictures, so that equal ones are known ([`Excess::pictures`]).
     pub(super) pictures: u64,
-    /// For both pictures, and what judging them took.
+    /// For both pictures, of all views that were rendered, and what judging them took.
     pub(super) seconds: f64,
+    #[serde(default = "one")]
+    pub(super) views: usize,
     pub(super) judging_seconds: f64,
+}
+
+fn one() -> usize {
+    1
 }
