@@ -157,6 +157,10 @@ pub fn feed(samples: &Samples, edge: usize, mistake: Mistake, passes: Option<u64
     let params = Params::default().with_tile(edge).with_max_spp(1 << 30);
     let (width, height) = samples.size;
     let mut session = Session::new(width, height, Oracle::bundled(), params).expect("a session");
+    // Nobody says so of what is encoded
+    if mistake != Mistake::Srgb {
+        session.set_linear();
+    }
     let grid = session.film().grid();
     let (mut had, most) = (0, samples.units.len() as u64 * UNIT);
     let mut outcome = Outcome::default();

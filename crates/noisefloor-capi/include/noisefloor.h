@@ -597,7 +597,7 @@ NfStatus nf_session_warning(const NfSession *session,
 NfStatus nf_session_share_pixels(const NfSession *session,
                                  bool shared);
 
-// Says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches have
+// Says that what is pushed is linear radiance, so that no warning asks: where all batches have
 // one size, nothing tells that from values that were encoded for a screen.
 NfStatus nf_session_set_linear(const NfSession *session);
 

@@ -103,7 +103,7 @@ export interface SessionOptions {
   /** Whether neighbouring pixels have noise in common, as with a pixel filter: no warning says so then. */
   sharedPixels?: boolean;
   /**
-   * Says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches have
+   * Says that what is pushed is linear radiance, so that no warning asks: where all batches have
    * one size, nothing tells that from values that were encoded for a screen.
    */
   linear?: boolean;

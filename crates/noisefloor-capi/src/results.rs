@@ -188,7 +188,7 @@ pub extern "C" fn nf_session_share_pixels(session: *const NfSession, shared: boo
     })
 }
 
-/// Says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches have
+/// Says that what is pushed is linear radiance, so that no warning asks: where all batches have
 /// one size, nothing tells that from values that were encoded for a screen.
 #[unsafe(no_mangle)]
 pub extern "C" fn nf_session_set_linear(session: *const NfSession) -> NfStatus {

@@ -43,7 +43,7 @@ use std::sync::{Mutex, MutexGuard};
 ///     (height, width, 3). The denoiser is then called with (radiance, albedo, normal); first_hits_are_clean knows whether it may take
 ///     them at their word.
 /// passes: 4 or 8 if the finished picture is the mean of so many mirror images (mirror_mean). Verdicts take one.
-/// linear: says that what is pushed is linear radiance, so that no warning asks: where no value is above 1 and all batches
+/// linear: says that what is pushed is linear radiance, so that no warning asks: where all batches
 ///     have one size, nothing tells that from values that were encoded for a screen.
 ///
 /// Threads may call any method at any time; calls take turns. The interpreter's lock is released while

@@ -4,7 +4,7 @@
 //! on: one thread pushes and judges what was handed over, in that order, by an ordinary [`Session`]. Stops, warnings
 //! and faults are those of that session, to the bit, and come when they come ([`Background::news`]). Samples that a
 //! tile gets after it stopped, since nobody could know yet, are kept aside, so that they change no verdict, and count
-//! in the picture at the end.
+//! in the picture at the end, unless they are of other light ([`Warning::Late`]).
 //!
 //! ```
 //! use noisefloor::background::{Background, WhenFull};
@@ -353,6 +353,17 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     #[doc(hidden)]
     pub fn take_session(&self) -> Result<Session<C>, SessionError> {
         self.take()
+    }
+
+    /// Drops passes that wait, and ends the thread once the verdict that is being given is; nothing more is taken. For
+    /// languages whose interpreter ends before this is dropped.
+    #[doc(hidden)]
+    pub fn stop(&self) {
+        let mut state = self.shared.state();
+        state.waiting.clear();
+        state.closed = true;
+        drop(state);
+        self.end();
     }
 
     fn take(&self) -> Result<Session<C>, SessionError> {

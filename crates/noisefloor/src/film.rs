@@ -518,6 +518,14 @@ impl Film {
         std::array::from_fn(|c| blend([a[c], b[c]], weights))
     }
 
+    /// Whether every pixel has this mean.
+    pub(crate) fn is_all(&self, mean: Rgb) -> bool {
+        self.grid.tiles().all(|tile| {
+            let pixel = self.pixels_of(tile.index);
+            tile.rows(self.grid.width()).flatten().all(|place| pixel(place) == mean)
+        })
+    }
+
     /// [`Film::pixel`] of many pixels of a tile.
     pub(crate) fn pixels_of(&self, tile: usize) -> impl Fn(usize) -> Rgb {
         // As all pixels have the samples of their tile, but where some were kept out

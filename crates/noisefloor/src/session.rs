@@ -221,8 +221,7 @@ impl<C: StoppingCriterion> Session<C> {
         self.film.negative()
     }
 
-    /// Says that what is pushed is linear radiance, so that no warning asks. Where no value is above 1 and all batches have
-    /// one size, nothing tells that from values that were encoded for a screen. A [`Driver`](crate::Driver) does this by
+    /// Says that what is pushed is linear radiance, so that no warning asks. Where all batches have one size, nothing tells that from values that were encoded for a screen. A [`Driver`](crate::Driver) does this by
     /// itself, as sources promise it.
     pub fn set_linear(&mut self) {
         self.watch.set_linear();
@@ -310,13 +309,14 @@ impl<C: StoppingCriterion> Session<C> {
         tiles: &[Tile],
         pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
     ) -> Result<(), SessionError> {
-        self.push_given(spp, tiles, &pixels, &pixels)
+        self.push_given((spp, 0.0), tiles, &pixels, &pixels)
     }
 
-    /// The same of batches that the caller has given in other numbers, those of running means.
+    /// The same of batches that the caller has given in other numbers, those of running means, which have `growth` times as
+    /// many samples.
     fn push_given<'a>(
         &mut self,
-        spp: u64,
+        (spp, growth): (u64, f64),
         tiles: &[Tile],
         pixels: &(impl Fn(Tile) -> TilePixels<'a> + Sync),
         given: &(impl Fn(Tile) -> TilePixels<'a> + Sync),
@@ -335,31 +335,49 @@ impl<C: StoppingCriterion> Session<C> {
         let compared = |&tile: &Tile| (tile, watch.compare(film, tile, spp, pixels(tile)));
         let compared: Vec<_> = accepted.par_iter().map(compared).collect();
         film.add_tiles(spp, accepted, pixels);
-        watch.see(compared, spp, pixels, given);
+        watch.see(compared, (spp, growth), pixels, given);
         refused
     }
 
-    /// Adds samples that came after their tile had stopped: they are not watched.
+    /// Adds samples that came after their tile had stopped, where they are like those before.
     pub(crate) fn add_late(&mut self, late: &Film) -> Result<(), FilmError> {
         let grid = self.film.grid();
-        for tile in grid.tiles().filter(|tile| late.spp(tile.index) > 0) {
+        let batch_of = |tile: Tile| {
             let valid = |pixel| late.pixel_counts(tile.index, pixel)[0] > 0;
             let mean = |pixel| if valid(pixel) { late.pixel(tile.index, pixel) } else { [f32::NAN; 3] };
-            let mean: Vec<Rgb> = tile.rows(grid.width()).flatten().map(mean).collect();
-            self.film.add(tile.index, late.spp(tile.index), &mean)?;
-        }
-        Ok(())
+            (late.spp(tile.index), tile.rows(grid.width()).flatten().map(mean).collect())
+        };
+        let tiles = grid.tiles().filter(|tile| late.spp(tile.index) > 0);
+        self.add_late_batches(tiles.map(|tile| (tile, batch_of(tile))))
     }
 
     /// The same, of a running mean of the whole image.
     pub(crate) fn add_late_running(&mut self, total: u64, image: &[Rgb]) -> Result<(), FilmError> {
         let grid = self.film.grid();
-        for tile in grid.tiles() {
-            if !self.is_open(tile.index) && self.film.spp(tile.index) < total {
-                let mean = TilePixels::in_image(tile, image, grid.width());
-                let (new, batch) = self.film.new_of_running(tile, total, mean)?;
-                self.film.add(tile.index, new, &batch)?;
+        let late = |tile: &Tile| !self.is_open(tile.index) && self.film.spp(tile.index) < total;
+        let new_of = |tile: Tile| {
+            let mean = TilePixels::in_image(tile, image, grid.width());
+            Ok((tile, self.film.new_of_running(tile, total, mean)?))
+        };
+        let batches = grid.tiles().filter(late).map(new_of).collect::<Result<Vec<_>, FilmError>>()?;
+        self.add_late_batches(batches.into_iter())
+    }
+
+    fn add_late_batches(
+        &mut self,
+        batches: impl Iterator<Item = (Tile, (u64, Vec<Rgb>))>,
+    ) -> Result<(), FilmError> {
+        let (mut tiles, mut of) = (0, 0);
+        for (tile, (spp, mean)) in batches {
+            of += 1;
+            if self.watch.is_like(&self.film, tile, spp, TilePixels::alone(tile, &mean)) {
+                self.film.add(tile.index, spp, &mean)?;
+            } else {
+                tiles += 1;
             }
+        }
+        if tiles > 0 {
+            self.watch.warn(Warning::Late { tiles, of });
         }
         Ok(())
     }
@@ -372,9 +390,8 @@ impl<C: StoppingCriterion> Session<C> {
         let place = self.film.check(tile, mean.len())?;
         let (new, batch) = self.film.new_of_running(place, total, TilePixels::alone(place, mean))?;
         let pixels = |tile| TilePixels::alone(tile, &batch);
-        self.push_given(new, &[place], &pixels, &|tile| TilePixels::alone(tile, mean))?;
-        self.watch.see_running();
-        Ok(())
+        let of = (new, total as f64 / new as f64);
+        self.push_given(of, &[place], &pixels, &|tile| TilePixels::alone(tile, mean))
     }
 
     /// Adds the new samples in a running mean of the whole image, row-major, to every open tile: `total` samples per pixel so
@@ -416,8 +433,8 @@ impl<C: StoppingCriterion> Session<C> {
             }
             let place = |tile: &Tile| alike.partition_point(|other| other.index < tile.index);
             let pixels = |tile: Tile| TilePixels::alone(tile, &batches[place(&tile)]);
-            self.push_given(spp, &alike, &pixels, &|tile| TilePixels::in_image(tile, image, width))?;
-            self.watch.see_running();
+            let of = (spp, total as f64 / spp as f64);
+            self.push_given(of, &alike, &pixels, &|tile| TilePixels::in_image(tile, image, width))?;
         }
         Ok(())
     }

@@ -163,7 +163,7 @@ pub enum StillWarning {
     Neighbours(f64),
     /// One has another exposure.
     #[error(
-        "the picture is {0:.2} times as bright as what it is compared with, nearly everywhere: \
+        "the picture is {0:.2} times as bright as what it is compared with, where there is light: \
          render both with one exposure, as their difference is not noise alone"
     )]
     Brightness(f64),

@@ -16,21 +16,22 @@
 //!
 //! | watched | from | says |
 //! |---|---|---|
-//! | a − b against 0 where the tile is rough, and batches that differ | three batches | [`Fault::Repeated`] |
-//! | the same while all are equal and of one size: a picture without noise, or one seed | two batches | no tile stops; [`Warning::Repeated`] after three |
+//! | each batch against the first, and its digest against those of 128 others, where batches differ | three batches | [`Fault::Repeated`] |
+//! | the same while a rough tile's are all equal and of one size: no noise, or one seed | two batches | no tile stops; [`Warning::Repeated`] after three |
 //! | correlation of a − c with b − d | a group | [`Fault::Shared`], [`Warning::Shared`], [`Warning::Anticorrelated`] |
 //! | the same, while (c − d)² is smaller than (a − b)² | a group | [`Fault::Running`] |
 //! | the same, but only with what all pixels of a tile have in common | a group | [`Warning::Changing`] |
 //! | correlation of a − b with a + b − 2c: is a noisier than b? | a group | [`Warning::Noise`] |
 //! | the same with the neighbours in place of c | two batches | [`Warning::Noise`], and no tile stops before a group says that it is no running mean |
 //! | energy of a − b against that of c − d, of the larger batches relative to their numbers of samples | a group | [`Warning::Counts`] |
-//! | all pixels of a batch against the picture before, made of smaller batches: is it brighter? | a batch | [`Warning::Encoded`] |
+//! | all pixels of a batch against the picture before, made of smaller batches: is it brighter? | a batch | [`Warning::Encoded`], and no tile stops |
 //! | steps across the borders of tiles, beside those if tiles lay otherwise | a batch of each tile | [`Warning::MixedUp`] |
 //! | correlation of a − b with itself one pixel beside | two batches | [`Warning::Neighbours`] |
 //! | values that are k/255, or the sRGB decoding of one, and have noise | two batches | [`Fault::Quantised`] |
 //! | noise that ends at exactly 1 | two batches | [`Warning::Clipped`] |
 //! | one value everywhere | two batches | [`Warning::Constant`] |
 //! | infinities, NaN, light below 0 | a batch | [`Fault::Light`] |
+//! | pixels of the picture that are below 0 | a verdict | [`Warning::Negative`] |
 //!
 //! # How often chance alone says so
 //! If samples are independent and a and c have equal sizes, exchanging a pixel's a and c leaves everything
@@ -50,9 +51,11 @@
 //! addition, a correlation Σt/Σ|t| of at least a fifth; running means have 0.4 and more.
 //!
 //! # What is not noticed
-//! Faults in fewer than four batches of a tile, but for repeated ones. Pictures encoded for a screen in
+//! Faults in fewer than four batches of a tile, but for repeated ones. What all batches have in common: a part of
+//! their samples from one seed, of batches of one size, is as a texture of the picture is. Running means whose seeds
+//! repeat otherwise than from the first batch on. Pictures encoded for a screen in
 //! floating point, or sums, in batches of one size whose noise does not reach white: equal batches of them
-//! are as independent as any. That nothing is above 1 says little: a sky or a lamp of 1 is as common. Counts
+//! are as independent as any. Counts
 //! that are all wrong by one factor, or that grow with batches of few samples, where a few fireflies make
 //! all noise energy. Tiles that were mixed up where the picture hardly varies along their borders beside its
 //! noise, and a whole picture that is upside down.
@@ -62,6 +65,7 @@ mod correlation;
 mod group;
 mod light;
 mod points;
+mod repeats;
 mod said;
 mod shift;
 mod values;
@@ -75,11 +79,10 @@ pub(crate) use values::PictureValues;
 use crate::criterion::Verdict;
 use crate::display::luminance;
 use crate::film::Film;
-use crate::rgb::Rgb;
 use crate::source::PixelNoise;
 use crate::tile::{Tile, TileGrid, TilePixels};
-use correlation::Sums;
-use group::{Likeness, TileWatch};
+use correlation::{Energies, Sums};
+use group::TileWatch;
 use light::SeenLight;
 use points::Points;
 use rayon::prelude::*;
@@ -104,8 +107,8 @@ pub(crate) struct Watch {
     tiles: Vec<TileWatch>,
     /// Of all groups, and of those between the last two looks.
     sums: [Sums; 2],
-    /// Samples from which it is worth to look at the borders of tiles again.
-    borders_at: u64,
+    /// Samples from which it is worth to look at the whole picture again.
+    picture_at: u64,
     warnings: Vec<Warning>,
     /// Whether running means were pushed.
     running: bool,
@@ -113,13 +116,6 @@ pub(crate) struct Watch {
     sizes_vary: bool,
     /// Values are linear radiance, as whoever pushes them says.
     linear: bool,
-}
-
-/// What a batch says beside the picture that it is going to be added to.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Beside {
-    shift: Option<Shift>,
-    likeness: Option<Likeness>,
 }
 
 impl Watch {
@@ -130,7 +126,7 @@ impl Watch {
             sequences: None,
             tiles: vec![TileWatch::default(); grid.len()],
             sums: [Sums::default(); 2],
-            borders_at: 0,
+            picture_at: 0,
             warnings: Vec::new(),
             running: false,
             sizes_vary: false,
@@ -164,7 +160,8 @@ impl Watch {
     pub(crate) fn restore(&mut self, kept: Self) -> bool {
         let points = self.points();
         let fits = |(tile, watch): (Tile, &TileWatch)| {
-            watch.fits(points.at_first(tile).count(), points.of(tile).count())
+            watch.repeats.fits(tile, watch.batches)
+                && watch.fits(points.at_first(tile).count(), points.of(tile).count())
         };
         let fits = kept.grid == self.grid
             && kept.tiles.len() == self.grid.len()
@@ -217,40 +214,52 @@ impl Watch {
         checked.map_err(|light| Fault::Light { tile: tile.index, light })
     }
 
+    /// Whether samples that came after their tile had stopped are of the same light. Of n samples with mean l, independent of
+    /// halves a and b, E(a − l)(b − l) = σ²/n is as much of E(a − b)² as their numbers say; a lamp that went on adds to it
+    /// in all pixels, and a firefly in one.
+    pub(crate) fn is_like(&self, film: &Film, tile: Tile, spp: u64, late: TilePixels<'_>) -> bool {
+        let mut energies = Energies::default();
+        for (pixel, late) in tile.rows(self.grid.width()).flatten().zip(late.iter()) {
+            let [(a, of_a), (b, of_b)] = film.pixel_halves(tile.index, pixel);
+            let [a, b, late] = [a, b, late].map(|pixel| f64::from(luminance(pixel)));
+            let rounding = f64::from(repeats::ROUNDING) * a.abs();
+            if of_a > 0 && of_b > 0 && late.is_finite() && (a - late).abs() > rounding {
+                let times = 1.0 / (spp as f64 * (1.0 / of_a as f64 + 1.0 / of_b as f64));
+                energies.see(times * (a - b).powi(2), (a - late) * (b - late));
+            }
+        }
+        let light = self.check_light(film, tile, spp, late, self.glance(tile, late));
+        light.is_ok() && energies.excess(1.0).is_none()
+    }
+
     /// What a batch says beside the picture that it is going to be added to.
-    pub(crate) fn compare(&self, film: &Film, tile: Tile, spp: u64, mean: TilePixels<'_>) -> Beside {
-        let watch = &self.tiles[tile.index];
-        let shift = if self.shared { None } else { Shift::of(film, tile, watch.batches, spp, mean) };
-        let likeness = watch.may_repeat().then(|| {
-            let points = || self.points().of(tile);
-            let at = |x: usize, y: usize| {
-                luminance(film.pixel(tile.index, (tile.y + y) * self.grid.width() + tile.x + x))
-            };
-            let before: Vec<[f32; 3]> = points().map(|(x, y)| [x - 1, x, x + 1].map(|x| at(x, y))).collect();
-            let now: Vec<[f32; 3]> = points().map(|place| points::light(mean, place)).collect();
-            group::likeness_of_noise(&before, &now)
-        });
-        Beside { shift, likeness: likeness.flatten() }
+    pub(crate) fn compare(&self, film: &Film, tile: Tile, spp: u64, mean: TilePixels<'_>) -> Option<Shift> {
+        if self.shared { None } else { Shift::of(film, tile, self.tiles[tile.index].batches, spp, mean) }
     }
 
     /// Takes notice of batches that were added, of tiles in the order of the grid, of what they said before, and of the
-    /// numbers that the caller gave: of running means, those are not the batches'.
+    /// numbers that the caller gave: of running means, those are not the batches', and have `growth` times their samples.
     pub(crate) fn see<'a>(
         &mut self,
-        seen: Vec<(Tile, Beside)>,
-        spp: u64,
+        seen: Vec<(Tile, Option<Shift>)>,
+        (spp, growth): (u64, f64),
         pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
         given: impl Fn(Tile) -> TilePixels<'a> + Sync,
     ) {
-        self.sizes_vary |= seen.iter().any(|(tile, _)| !self.tiles[tile.index].is_size(spp));
+        self.running |= growth > 0.0;
+        self.sizes_vary |= seen.iter().any(|(tile, _)| !self.tiles[tile.index].repeats.is_size(spp));
         let (points, shared) = (self.points(), self.shared);
         let mut seen = seen.into_iter().peekable();
         let watched = self.tiles.iter_mut().enumerate();
-        let watched: Vec<(&mut TileWatch, (Tile, Beside))> = watched
+        let watched: Vec<(&mut TileWatch, (Tile, Option<Shift>))> = watched
             .filter_map(|(i, watch)| seen.next_if(|(tile, _)| tile.index == i).map(|of_it| (watch, of_it)))
             .collect();
-        watched.into_par_iter().for_each(|(watch, (tile, beside))| {
-            Self::see_tile(watch, (points, shared), tile, spp, [pixels(tile), given(tile)], beside);
+        watched.into_par_iter().for_each(|(watch, (tile, shift))| {
+            let batch = [pixels(tile), given(tile)];
+            let total = if growth > 0.0 { (growth * spp as f64).round() as u64 } else { spp };
+            watch.sums.shift.add(&shift.unwrap_or_default());
+            watch.repeats.see(tile, watch.batches, spp, batch, growth as f32);
+            Self::see_tile(watch, (points, shared), tile, (spp, total), batch);
         });
     }
 
@@ -258,14 +267,9 @@ impl Watch {
         watch: &mut TileWatch,
         (points, shared): (Points, bool),
         tile: Tile,
-        spp: u64,
+        (spp, total): (u64, u64),
         [mean, given]: [TilePixels<'_>; 2],
-        beside: Beside,
     ) {
-        watch.sums.shift.add(&beside.shift.unwrap_or_default());
-        if let Some(likeness) = beside.likeness {
-            watch.resembles_mean(spp, likeness);
-        }
         let batch = watch.batches;
         watch.batches += 1;
         let group = batch / 4;
@@ -274,9 +278,7 @@ impl Watch {
         }
         let light = |place| points::light(mean, place);
         if group == 0 {
-            let values: Vec<Rgb> = points.of(tile).map(|(x, y)| given.row(y)[x]).collect();
-            values.iter().for_each(|&value| watch.values.see(value));
-            watch.see_values(values);
+            points.of(tile).for_each(|(x, y)| watch.values.see(given.row(y)[x], total));
             watch.see(spp, points.at_first(tile).map(light).collect());
         } else {
             watch.see(spp, points.of(tile).map(light).collect());
@@ -284,11 +286,6 @@ impl Watch {
         if let Some(found) = watch.compare(shared) {
             watch.sums.add(&found);
         }
-    }
-
-    /// Takes notice that what comes was a running mean.
-    pub(crate) fn see_running(&mut self) {
-        self.running = true;
     }
 
     /// Adds up what tiles have found since the last look, in their order: a sum of floating-point numbers depends on
@@ -317,28 +314,27 @@ impl Watch {
         let found = found.chain(self.sums[0].doubt().map(Warning::Noise));
         let found = found.chain(self.sums[0].may_be_totals().map(Warning::Totals));
         let samples = film.total_samples();
-        let mixed_up = if samples >= self.borders_at { borders::mix_up(film) } else { None };
-        if samples >= self.borders_at {
-            self.borders_at = samples + samples / 2;
+        let grown = samples >= self.picture_at;
+        let mixed_up = if grown { borders::mix_up(film) } else { None };
+        let negative = if grown && !self.shared { light::negative(film) } else { None };
+        if grown {
+            self.picture_at = samples + samples / 2;
         }
-        let found = found.chain(mixed_up.map(Warning::MixedUp));
+        let found = found.chain(mixed_up.map(Warning::MixedUp)).chain(negative.map(Warning::Negative));
         let behind = if self.running { self.sums[0].behind() } else { None };
         let found = found.chain(behind.map(Warning::Behind));
-        let clipped = self.sums[0].clipped(&values);
-        let unsaid = self.is_unsaid(&values).then_some(Warning::Unsaid).filter(|_| clipped.is_none());
-        let found: Vec<Warning> = found
-            .chain(clipped)
-            .chain(values.constant())
-            .chain(repeats)
-            .chain(rounded)
-            .chain(unsaid)
-            .collect();
+        let clipped = self.sums[0].clipped(&values).filter(|_| !self.linear);
+        let constant = self.tiles.iter().all(|tile| tile.repeats.first_again).then(|| film.pixel(0, 0));
+        let constant = constant.filter(|&colour| film.is_all(colour)).map(Warning::Constant);
+        let unsaid = self.is_unsaid().then_some(Warning::Unsaid).filter(|_| clipped.is_none());
+        let found: Vec<Warning> =
+            found.chain(clipped).chain(constant).chain(repeats).chain(rounded).chain(unsaid).collect();
         found.into_iter().for_each(|warning| self.warn(warning));
         Ok(())
     }
 
     /// Takes a warning down, unless one of its kind is there.
-    fn warn(&mut self, warning: Warning) {
+    pub(crate) fn warn(&mut self, warning: Warning) {
         let kind = std::mem::discriminant(&warning);
         if !self.warnings.iter().any(|known| std::mem::discriminant(known) == kind) {
             self.warnings.push(warning);
@@ -356,54 +352,55 @@ impl Watch {
     }
 
     /// Whether values may be encoded for a screen or not, and nobody has said.
-    fn is_unsaid(&self, values: &Values) -> bool {
-        let told = self.linear || self.sizes_vary || values.above_one;
-        !told && self.tiles.iter().any(|tile| tile.batches >= 4 && tile.varies)
+    fn is_unsaid(&self) -> bool {
+        !(self.linear || self.sizes_vary)
+            && self.tiles.iter().any(|tile| tile.batches >= 4 && tile.repeats.varies())
     }
 
     /// Whether nothing may stop till more batches have come: the first two look like running means, and four do not
     /// say otherwise; batches have more and more samples, as totals have, and four have not come yet, or look like
-    /// them; all are one picture of one size, which may have noise; or running means are of so few bits that they are
+    /// them; larger ones are brighter; all are one picture of one size, which may have noise; or running means are of so few bits that they are
     /// going to end.
     pub(crate) fn doubts(&self) -> bool {
         let sums = &self.sums[0];
         sums.doubt().is_some()
             || sums.may_be_totals().is_some()
             || self.tiles.iter().any(|tile| tile.grows && tile.batches < 4)
+            || sums.encoded().is_some()
             || self.alike().is_some()
             || (self.running && self.warnings.iter().any(|warning| matches!(warning, Warning::Rounded(_))))
     }
 
     /// The number of samples of each batch of a tile that may have noise or not, as all were the same picture.
     pub(crate) fn only_size(&self, tile: usize) -> Option<u64> {
-        self.tiles[tile].only_size()
+        self.tiles[tile].repeats.only_size()
     }
 
     /// Tiles of which all batches are the same picture, if those are most that look noisy, and none tells whether there
     /// is noise.
     fn alike(&self) -> Option<(usize, usize)> {
-        let of = self.tiles.iter().filter(|tile| tile.noisy).count();
-        let tiles = self.tiles.iter().filter(|tile| tile.noisy && tile.may_have_noise()).count();
-        (2 * tiles > of && !self.tiles.iter().any(TileWatch::is_told)).then_some((tiles, of))
+        let of = self.tiles.iter().filter(|tile| tile.repeats.rough).count();
+        let tiles = self.tiles.iter().filter(|tile| tile.repeats.is_one_picture()).count();
+        (2 * tiles > of && !self.tiles.iter().any(|tile| tile.repeats.is_told())).then_some((tiles, of))
     }
 
-    /// Whether the noise of half of the noisy tiles came twice. Pixels that were never seen to change may have none.
+    /// Whether a tile's noise came twice. Pixels that were never seen to change may have none.
     fn check_repeats(&self) -> Result<Option<Warning>, Fault> {
-        let noisy = || self.tiles.iter().filter(|tile| tile.noisy);
-        let (tiles, of) =
-            noisy().fold((0, 0), |(n, of), tile| (n + usize::from(tile.repeats_noise()), of + 1));
-        if 2 * tiles > of {
-            return Err(Fault::Repeated { tiles, of });
+        let of_all =
+            |which: &dyn Fn(&TileWatch) -> bool| self.tiles.iter().filter(|tile| which(tile)).count();
+        let tiles = of_all(&|tile| tile.repeats.are_certain(self.shared));
+        if tiles > 0 {
+            return Err(Fault::Repeated { tiles, of: of_all(&|tile| tile.repeats.varies()) });
         }
         // Two of the first three batches that a session asks for have different sizes
-        let told = noisy().all(|tile| tile.batches > 2);
+        let told = self.tiles.iter().filter(|tile| tile.repeats.rough).all(|tile| tile.batches > 2);
         Ok(self.alike().filter(|_| told).map(|(tiles, of)| Warning::Repeated { tiles, of }))
     }
 
     /// Whether all values are of fewer bits than those of 32-bit floats.
     fn check_precision(&self, values: &Values, film: &Film) -> Result<Option<Warning>, Fault> {
         // A picture without noise may be of 8-bit numbers: an unlit texture is. Noise of them is an 8-bit picture's
-        if !self.tiles.iter().any(|tile| tile.varies) {
+        if !self.tiles.iter().any(|tile| tile.repeats.varies()) {
             return Ok(None);
         }
         if let Some(encoding) = values.quantised() {

@@ -509,6 +509,7 @@ fn an_object_before_a_detailed_background_is_no_fault() {
         let edge = 192;
         let params = Params::default().with_tile(32).with_max_spp(120);
         let mut session = Session::new(edge, edge, Oracle::bundled(), params).unwrap();
+        session.set_linear();
         let pixel = |(x, y): (usize, usize), first, spp| {
             let from_middle = [x, y].map(|at| at as f64 / edge as f64 - 0.5);
             if from_middle[0].hypot(from_middle[1]) < radius {

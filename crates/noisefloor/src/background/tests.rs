@@ -296,6 +296,63 @@ fn faults_come_later_and_the_session_comes_back() {
     assert_eq!(background.into_session().unwrap().film().spp(0), 16);
 }
 
+/// Of samples that came after their tile had stopped, those of other light are left out, of all tiles or of one.
+#[test]
+fn late_samples_of_other_light_are_left_out() {
+    let grid = TileGrid::new(64, 64, 32).unwrap();
+    let image = |pass: u64, late: f32| -> Vec<Rgb> {
+        let mut noise = Noise::keyed(&[64, pass]);
+        (0..64 * 64).map(|_| [(0.4 + 0.1 * noise.normal()) as f32 * late; 3]).collect()
+    };
+    // A lamp that few samples find is none
+    let rare = |pass: u64| {
+        let mut image = image(pass, 1.0);
+        image[7] = [1e4; 3];
+        image
+    };
+    let finished = |late: &dyn Fn(u64) -> Vec<Rgb>, running: bool| {
+        let session =
+            Session::new(64, 64, crate::Oracle::bundled(), fresh(grid).params().clone().with_max_spp(32));
+        let background = Background::new(session.unwrap(), 2, WhenFull::Wait).unwrap();
+        let mut sum = vec![[0.0; 3]; 64 * 64];
+        for pass in 0..6 {
+            let image = if pass < 2 { image(pass, 1.0) } else { late(pass) };
+            sum.as_flattened_mut().iter_mut().zip(image.as_flattened()).for_each(|(sum, new)| *sum += new);
+            if running {
+                let mean = sum.iter().map(|pixel| pixel.map(|c| c / (pass + 1) as f32)).collect();
+                background.push_running_image(16 * (pass + 1), mean).unwrap();
+            } else {
+                background.push_image(16, image).unwrap();
+            }
+            background.judge().unwrap();
+        }
+        let news = background.finish().unwrap();
+        assert!(background.is_done() && news.stops.len() == 4, "{news:?}");
+        let session = background.into_session().unwrap();
+        let late = session.warnings().iter().find(|warning| matches!(warning, Warning::Late { .. })).copied();
+        (grid.tiles().map(|tile| session.film().spp(tile.index)).collect::<Vec<_>>(), late)
+    };
+    let right = (vec![96; 4], None);
+    let left_out = (vec![32; 4], Some(Warning::Late { tiles: 4, of: 4 }));
+    for running in [false, true] {
+        assert_eq!(finished(&|pass| image(pass, 1.0), running), right);
+        assert_eq!(finished(&rare, running), right);
+        for other in [-5.0, 0.8, 1.2, 1e20] {
+            assert_eq!(finished(&|pass| image(pass, other), running), left_out, "{other} {running}");
+        }
+        let (spp, late) = finished(
+            &|pass| {
+                let mut image = image(pass, 1.0);
+                image[..64 * 32].iter_mut().step_by(64).flatten().for_each(|c| *c += 9.0);
+                image[..32].fill([9.0; 3]);
+                image
+            },
+            running,
+        );
+        assert_eq!((spp, late), (vec![32, 96, 96, 96], Some(Warning::Late { tiles: 1, of: 4 })));
+    }
+}
+
 #[test]
 fn what_does_not_fit_is_refused_at_once() {
     let background = Background::new(of_calls(|| ()), 1, WhenFull::Wait).unwrap();

@@ -14,9 +14,9 @@ const CERTAIN: f64 = 6.5;
 const NOTABLE: f64 = 0.1;
 /// Mean difference of a tile from which it may be unlike, as a share of the display's range.
 const UNLIKE: f64 = 0.1;
-/// Ratio of brightness worth a warning. Where one picture has few samples, most of its blocks are darker than
-/// the mean, since few pixels have found what light is seldom found.
-const BRIGHTER: f64 = 1.25;
+/// Ratio of brightness worth a warning: verdicts take as much for noise. Where one picture has few samples, most of its
+/// blocks are darker than the mean, since few pixels have found what light is seldom found, and the mean is not.
+const BRIGHTER: f64 = 1.03;
 
 impl SnapshotPair<'_> {
     /// What the whole pictures say against a verdict on them. Whoever judges two pictures asks first.

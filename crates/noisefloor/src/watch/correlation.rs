@@ -142,7 +142,7 @@ impl Energies {
 
     /// How many times the energy of the one the other has, if that is neither chance nor little; with z
     /// divided by what pixels that are not independent widen it by.
-    fn excess(&self, widening: f64) -> Option<f64> {
+    pub(super) fn excess(&self, widening: f64) -> Option<f64> {
         self.excess_of(FACTOR, widening)
     }
 
@@ -309,7 +309,7 @@ impl Sums {
             warnings.push(Warning::Anticorrelated(value));
         }
         let whole = self.batches.value();
-        let encoded = self.shift.brighter(self.widening());
+        let encoded = self.encoded();
         if !shared && self.z(&self.batches) > CERTAIN && whole > STRONG && z < CERTAIN && encoded.is_none() {
             warnings.push(Warning::Changing(whole));
         }
@@ -333,6 +333,11 @@ impl Sums {
         }
         warnings.extend(encoded.map(Warning::Encoded));
         warnings.into_iter()
+    }
+
+    /// What larger batches are brighter by, in per cent, if they are.
+    pub(super) fn encoded(&self) -> Option<f64> {
+        self.shift.brighter(self.widening())
     }
 
     /// How many times the noise, or the brightness, that their counts say later running means have beside the first, if

@@ -2,17 +2,11 @@
 
 use super::correlation::{Concordance, Correlation, Sums};
 use super::points::level;
+use super::repeats::{ROUNDING, Repeats};
 use super::values::{Ends, Values};
-use crate::rgb::Rgb;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
-/// Values that differ by less, relative to their size, are the same but for rounding.
-const ROUNDING: f32 = 1.0 / (1 << 18) as f32;
-/// Differences below this, relative to the pixels, are no noise.
-const ROUGH: f32 = 1e-3;
-/// Fewest rough pixels of a tile that has noise.
-const LEAST_ROUGH: usize = 4;
 /// Sizes of batches that may differ by this factor at most to be compared.
 const ALIKE: u64 = 2;
 /// Factor by which the sizes of two pairs of batches may differ whose noise is compared. If few fireflies
@@ -36,26 +30,13 @@ struct WatchedBatch {
 pub(super) struct TileWatch {
     /// Batches so far.
     pub(super) batches: u64,
-    /// Whether two batches came, the last of which looked noisy.
-    pub(super) noisy: bool,
-    /// Whether a batch came twice that looks noisy.
-    pub(super) repeated: bool,
-    /// Whether most pixels of a batch differed from those of the ones before: they have noise.
-    changes: bool,
-    /// Whether the same picture came of two numbers of samples: it has no noise.
-    still: bool,
-    /// Samples of the first batch.
-    size: u64,
+    pub(super) repeats: Repeats,
     /// Whether each of the first batches was said to have more samples than the one before.
     pub(super) grows: bool,
-    /// Whether values by themselves differ from batch to batch by more than rounding: they have noise.
-    pub(super) varies: bool,
     /// What was found since the last check.
     pub(super) sums: Sums,
     /// What the values of the first group have in common.
     pub(super) values: Values,
-    /// Those of the first batch, while the first group lasts.
-    first: Vec<Rgb>,
     group: Vec<WatchedBatch>,
 }
 
@@ -72,68 +53,7 @@ impl TileWatch {
         if let Some(last) = self.group.last() {
             self.grows = spp > last.spp && (self.group.len() == 1 || self.grows);
         }
-        if !self.group.is_empty() && is_rough(&light) {
-            self.noisy = true;
-            let alike: Vec<_> =
-                self.group.iter().map(|seen| (likeness(&seen.light, &light), seen.spp != spp)).collect();
-            alike.into_iter().for_each(|(likeness, another)| self.resembles(likeness, another));
-        }
-        if self.size == 0 {
-            self.size = spp;
-        }
         self.group.push(WatchedBatch { spp, light });
-    }
-
-    /// Whether the first batch, if there is one, had as many samples.
-    pub(super) fn is_size(&self, spp: u64) -> bool {
-        self.size == 0 || self.size == spp
-    }
-
-    /// Whether a batch is to be held against the mean of those before.
-    pub(super) fn may_repeat(&self) -> bool {
-        self.repeated && !self.changes
-    }
-
-    /// Takes notice of how a batch of `spp` samples that looks noisy resembles the mean of those before.
-    pub(super) fn resembles_mean(&mut self, spp: u64, likeness: Likeness) {
-        self.resembles(likeness, spp != self.size);
-    }
-
-    /// Takes notice of how a batch that looks noisy resembles one before, which had another number of samples or not.
-    fn resembles(&mut self, likeness: Likeness, another_size: bool) {
-        self.repeated |= likeness == Likeness::Same;
-        self.still |= likeness == Likeness::Same && another_size;
-        self.changes |= likeness == Likeness::Other;
-    }
-
-    /// Whether the same random numbers came twice: pixels that differ from batch to batch were all the same in two.
-    pub(super) fn repeats_noise(&self) -> bool {
-        self.repeated && self.changes
-    }
-
-    /// Whether all that came is one picture of one number of samples, so that nothing tells whether it has noise.
-    pub(super) fn may_have_noise(&self) -> bool {
-        self.repeated && !self.changes && !self.still
-    }
-
-    /// The number of samples of each batch, if that is so.
-    pub(super) fn only_size(&self) -> Option<u64> {
-        self.may_have_noise().then_some(self.size)
-    }
-
-    /// Whether a picture has no noise here, or has it as it should.
-    pub(super) fn is_told(&self) -> bool {
-        self.still || self.varies || (self.changes && !self.repeated)
-    }
-
-    /// Takes notice of the values of a batch of the first group.
-    pub(super) fn see_values(&mut self, values: Vec<Rgb>) {
-        if self.first.is_empty() {
-            self.first = values;
-        } else {
-            let pairs = self.first.as_flattened().iter().zip(values.as_flattened());
-            self.varies |= pairs.into_iter().any(|pair| !is_same_value(pair));
-        }
     }
 
     /// What the last batch says together with those before in its group.
@@ -149,56 +69,9 @@ impl TileWatch {
                 totals([a, b, c], &mut found);
             }
             self.group.clear();
-            self.first = Vec::new();
         }
         Some(found)
     }
-}
-
-/// How much of a batch is as in another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Likeness {
-    /// All of it, but for rounding.
-    Same,
-    /// Some pixels.
-    Part,
-    /// The fewest lit pixels, and rounding is not why.
-    Other,
-}
-
-fn likeness(one: &[[f32; 3]], other: &[[f32; 3]]) -> Likeness {
-    if is_same(one, other) {
-        return Likeness::Same;
-    }
-    let pixels = || one.iter().zip(other).map(|(one, other)| (one[1], other[1]));
-    let lit = pixels().filter(|(one, other)| one.max(*other) > 0.0).count();
-    let others =
-        pixels().filter(|(one, other)| (one - other).abs() > ROUGH * one.abs().max(other.abs())).count();
-    if 2 * others > lit { Likeness::Other } else { Likeness::Part }
-}
-
-/// Of two batches at the watched pixels, if the second looks noisy.
-pub(super) fn likeness_of_noise(before: &[[f32; 3]], now: &[[f32; 3]]) -> Option<Likeness> {
-    is_rough(now).then(|| likeness(before, now))
-}
-
-/// Whether most lit pixels differ from the line between their neighbours.
-fn is_rough(light: &[[f32; 3]]) -> bool {
-    let (mut lit, mut rough) = (0, 0);
-    for [left, here, right] in light {
-        let size = left.abs() + 2.0 * here.abs() + right.abs();
-        lit += usize::from(size > 0.0);
-        rough += usize::from((left - 2.0 * here + right).abs() > ROUGH * size);
-    }
-    rough >= LEAST_ROUGH && 2 * rough > lit
-}
-
-fn is_same(one: &[[f32; 3]], other: &[[f32; 3]]) -> bool {
-    one.as_flattened().iter().zip(other.as_flattened()).all(is_same_value)
-}
-
-fn is_same_value((a, b): (&f32, &f32)) -> bool {
-    a.to_bits() == b.to_bits() || (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 /// What differences at each watched pixel are multiplied by, 1/(t + m): m is the mean of these batches there,

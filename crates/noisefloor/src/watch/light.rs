@@ -1,6 +1,8 @@
 //! Light that cannot be: what a broken renderer sends in a well-formed batch.
 
+use super::points;
 use crate::display::luminance;
+use crate::film::Film;
 use crate::rgb::Rgb;
 use rayon::prelude::*;
 use thiserror::Error;
@@ -11,6 +13,8 @@ const MOST_NON_FINITE: f64 = 0.5;
 /// How far below zero the mean luminance of a tile may be by rounding, relative to the brightest pixel so
 /// far.
 const ROUNDING: f64 = 1e-3;
+/// Share of a picture's pixels below zero that is worth a warning.
+const BELOW_ZERO: f64 = 0.01;
 
 /// Why a batch cannot be the light of a scene.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -88,6 +92,20 @@ pub(crate) fn check_picture(pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
         brightest: sum.brightest.max(part.brightest),
     };
     parts.collect::<Vec<_>>().into_iter().fold(SeenLight::default(), and).by_itself()
+}
+
+/// The share of a picture's pixels whose luminance is below zero, in per cent, if they are not few: by more than rounding
+/// of what is as bright as the picture on average.
+pub(super) fn negative(film: &Film) -> Option<f64> {
+    let of_tile = |tile: crate::tile::Tile| {
+        let pixel = film.pixels_of(tile.index);
+        let light = move |(x, y)| f64::from(luminance(pixel((tile.y + y) * film.width() + tile.x + x)));
+        points::compared(tile).map(light).collect::<Vec<_>>()
+    };
+    let light: Vec<f64> = film.grid().tiles().flat_map(of_tile).collect();
+    let mean = light.iter().map(|light| light.abs()).sum::<f64>() / light.len() as f64;
+    let below = light.iter().filter(|&&light| light < -ROUNDING * mean).count() as f64 / light.len() as f64;
+    (below > BELOW_ZERO).then_some(100.0 * below)
 }
 
 /// What there is to see in pixels of a tile, apart from all others: luminance, where it is finite.

@@ -41,6 +41,12 @@ impl Points {
     }
 }
 
+/// Places within a tile at which batches are compared with those before: all of a small tile, and at least 512.
+pub(super) fn compared(tile: Tile) -> impl Iterator<Item = (usize, usize)> {
+    let step = (tile.pixels() / 512).isqrt().max(1);
+    (0..tile.height).step_by(step).flat_map(move |y| (0..tile.width).step_by(step).map(move |x| (x, y)))
+}
+
 /// Luminance of a pixel's left neighbour, of itself, and of its right neighbour.
 #[inline]
 pub(super) fn light(mean: TilePixels<'_>, (x, y): (usize, usize)) -> [f32; 3] {

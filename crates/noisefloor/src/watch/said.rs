@@ -183,7 +183,8 @@ pub enum Warning {
     /// The brightness depends on the number of samples.
     #[error(
         "batches of more samples are brighter, by {0:.2} %, and means of linear radiance are not: \
-         are the values encoded for a screen, tone mapped or clamped, or sums instead of means?"
+         are the values encoded for a screen, tone mapped or clamped, or sums instead of means? \
+         no tile is done while they look so"
     )]
     Encoded(f64),
     /// The tiles do not fit together.
@@ -195,6 +196,24 @@ pub enum Warning {
          push linear radiance, not what is shown on a screen"
     )]
     Clipped(f64),
+    /// Samples that came after their tile had stopped are of other light, and were left out.
+    #[error(
+        "in {tiles} of {of} tiles, samples that came after the tile had stopped are brighter or darker than those before, \
+         by more than noise explains: they are not in the picture; look whether the scene has changed"
+    )]
+    Late {
+        /// How many.
+        tiles: usize,
+        /// Of how many with such samples.
+        of: usize,
+    },
+    /// The picture has pixels below zero.
+    #[error(
+        "{0:.0} % of the picture's pixels have negative luminance, which light has not: a black level was taken off, \
+         a picture was taken off another, or a filter has negative lobes; \
+         verdicts wait long for an exposure of such a picture"
+    )]
+    Negative(f64),
     /// One value everywhere.
     #[error("every pixel of every batch is {}: is this what was rendered?", colour(.0))]
     Constant(Rgb),
@@ -226,7 +245,7 @@ pub enum Warning {
     },
     /// Nothing shows whether values are linear.
     #[error(
-        "no value is above 1, and all batches have one size: \
+        "all batches have one size: \
          nothing tells linear radiance from values that are encoded for a screen, \
          by which tiles stop up to twice too early; if these are linear, say so once (set_linear in Rust, \
          nf_session_set_linear in C, linear in Python and JavaScript)"

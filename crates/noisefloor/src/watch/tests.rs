@@ -1,12 +1,58 @@
 //! What is said of each mistake, and that nothing is said of what is right.
 
 use super::*;
+use crate::rgb::Rgb;
 use crate::{FixedSpp, Params, Schedule, Session, SessionError, source::PixelNoise};
 use noisefloor_testkit::Noise;
 
 const EDGE: usize = 128;
 /// Samples per pixel of a batch.
 const SPP: u64 = 10;
+
+/// Seeds that count up to a number and begin again, as frames of a blue-noise table do: the first batch comes again.
+/// Of odd ones, both halves would hold the same samples, and the picture would seem to have no noise.
+#[test]
+fn seeds_that_begin_again_are_a_fault() {
+    for period in [2, 3, 4, 5, 7, 8, 9, 16, 31, 200] {
+        let (fault, at, _) = said(EDGE, &[SPP; 210], |first, _| (SPP, batch(1 + first / SPP % period, SPP)));
+        assert_eq!((fault, at), (Some(Fault::Repeated { tiles: 4, of: 4 }), SPP * (period + 1)), "{period}");
+    }
+    // They begin later than with the first, or get stuck
+    let seed = |count: u64| if count < 20 { count } else { 10 + count % 10 };
+    assert!(matches!(feed(600, |count| (SPP, batch(1 + seed(count), SPP))).0, Some(Fault::Repeated { .. })));
+    assert!(matches!(
+        feed(600, |count| (SPP, batch(1 + count.min(30), SPP))).0,
+        Some(Fault::Repeated { .. })
+    ));
+    // Of running means, batches are differences, and equal but for rounding
+    let params = Params { tile: 64, min_spp: 0, ..Params::default() };
+    let mut session = Session::new(EDGE, EDGE, FixedSpp(1 << 29), params).unwrap();
+    let mut sum = vec![[0.0; 3]; EDGE * EDGE];
+    let fault = (1..40).find_map(|count| {
+        sum = mixed(1.0, &sum, 1.0, &batch(1 + (count - 1) % 9, SPP));
+        session.push_running_image(count * SPP, &mixed(1.0 / count as f32, &sum, 0.0, &sum)).unwrap();
+        session.look().err().map(|error| (count, error))
+    });
+    assert!(
+        matches!(fault, Some((..=11, SessionError::Fault(Fault::Repeated { tiles: 4, of: 4 })))),
+        "{fault:?}"
+    );
+}
+
+/// Samples that are 0 or 1, of which few pixels have any noise: two batches are equal by chance, and each batch of black is.
+#[test]
+fn batches_that_are_equal_by_chance_are_none() {
+    for noisy in [1, 5, 12, 40] {
+        let lit = |count: u64| {
+            let mut noise = Noise::keyed(&[noisy, count]);
+            let mut image = vec![[0.0; 3]; EDGE * EDGE];
+            (0..noisy)
+                .for_each(|i| image[(i * 331) as usize] = [f32::from(u8::from(noise.uniform() < 0.5)); 3]);
+            (1, image)
+        };
+        assert_eq!(feed(2000, lit), (None, 2000, Vec::new()), "{noisy}");
+    }
+}
 
 /// Linear radiance of a batch: a checker on a ramp, in skewed noise. `seed` is all that the noise depends on.
 fn batch(seed: u64, spp: u64) -> Vec<Rgb> {
@@ -20,11 +66,23 @@ fn batch(seed: u64, spp: u64) -> Vec<Rgb> {
     (0..EDGE * EDGE).map(pixel).collect()
 }
 
-/// Pushes pictures until `spp` are there or something is said: what, and at how many samples per pixel.
-fn feed(spp: u64, mut picture: impl FnMut(u64) -> (u64, Vec<Rgb>)) -> (Option<Fault>, u64, Vec<Warning>) {
+/// Pushes pictures of linear radiance until `spp` are there or something is said: what, and at how many samples per pixel.
+fn feed(spp: u64, picture: impl FnMut(u64) -> (u64, Vec<Rgb>)) -> (Option<Fault>, u64, Vec<Warning>) {
+    fed(true, spp, picture)
+}
+
+/// The same, said to be linear or not.
+fn fed(
+    linear: bool,
+    spp: u64,
+    mut picture: impl FnMut(u64) -> (u64, Vec<Rgb>),
+) -> (Option<Fault>, u64, Vec<Warning>) {
     let schedule = Schedule::Spaced { step: 10 };
     let params = Params { tile: 64, max_spp: 1 << 30, min_spp: 0, schedule, ..Params::default() };
     let mut session = Session::new(EDGE, EDGE, FixedSpp(1 << 29), params).unwrap();
+    if linear {
+        session.set_linear();
+    }
     let mut had = 0;
     for count in 0.. {
         let (new, image) = picture(count);
@@ -141,6 +199,30 @@ fn running_means_in_the_batches_asked_for_stop_no_tile() {
     assert!(matches!(session.warnings(), [Warning::Noise(times)] if *times > 10.0));
 }
 
+/// A buffer that is never divided: each batch is the sum of all samples so far, and so brighter than those before. The
+/// exposure undoes what halves have in common, so that it seems to have little noise.
+#[test]
+fn accumulated_sums_stop_no_tile() {
+    for seed in 1..5 {
+        let room = Room { edge: 64, kind: Kind::Exponential, seed };
+        let params = Params { tile: 32, ..Params::default() };
+        let mut session = Session::new(64, 64, crate::Oracle::bundled(), params).unwrap();
+        let mut had = 0;
+        while had < 600 {
+            let spp = session.requests()[0].spp;
+            had += spp;
+            session.push_image(spp, &mixed(had as f32, &room.mean(0, had), 0.0, &room.mean(0, 1))).unwrap();
+            match session.judge() {
+                Ok(stops) => assert_eq!(stops, [], "seed {seed}, {had}: {:?}", session.warnings()),
+                Err(error) => {
+                    assert!(matches!(error, SessionError::Fault(_)), "{error}");
+                    break;
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn overlapping_batches_and_changing_scenes_are_faults() {
     // Seeds count samples, and batches begin where the last was half done
@@ -184,6 +266,7 @@ fn a_pixel_filter_is_a_warning_unless_it_was_announced() {
 
     let params = Params { tile: 64, min_spp: 0, ..Params::default() };
     let mut session = Session::new(EDGE, EDGE, FixedSpp(1 << 12), params).unwrap();
+    session.set_linear();
     session.set_pixels(PixelNoise::Shared);
     for count in 0..8 {
         let mut image = batch(count + 1, SPP);
@@ -214,13 +297,31 @@ fn what_is_likely_is_said_once_with_its_number() {
     assert_eq!(fault, None);
     assert!(matches!(warnings[..], [Warning::Counts(f)] if (f - 2.0).abs() < 0.3), "{warnings:?}");
 
-    // Cut off at white
-    let (fault, _, warnings) =
-        changed(100, |image| image.iter_mut().flatten().for_each(|c| *c = (3.0 * *c).min(1.0)));
+    // Cut off at white, which nobody asks of what is said to be linear
+    let clipped = |linear: bool| {
+        fed(linear, 100, |count| {
+            (SPP, batch(count + 1, SPP).into_iter().map(|pixel| pixel.map(|c| (3.0 * c).min(1.0))).collect())
+        })
+    };
+    let (fault, _, warnings) = clipped(false);
     assert_eq!(fault, None);
     assert!(matches!(warnings[..], [Warning::Clipped(share)] if share > 5.0), "{warnings:?}");
+    assert_eq!(clipped(true), (None, 100, Vec::new()));
 
     assert_eq!(changed(100, |image| image.fill([0.25; 3])), (None, 100, vec![Warning::Constant([0.25; 3])]));
+    // One pixel is lit, which is none of those that are watched
+    let dot = |image: &mut Vec<Rgb>| {
+        image.fill([0.0; 3]);
+        image[0] = [1.0; 3];
+    };
+    assert_eq!(changed(100, dot), (None, 100, Vec::new()));
+
+    // A black level is taken off: half of the dark pixels are below zero, and no light is
+    let (fault, _, warnings) = changed(100, |image| {
+        image.iter_mut().flatten().for_each(|c| *c -= if *c < 0.5 { 0.15 } else { 0.0 })
+    });
+    assert_eq!(fault, None);
+    assert!(warnings.iter().any(|w| matches!(w, Warning::Negative(share) if *share > 5.0)), "{warnings:?}");
 }
 
 /// A picture without noise is no repetition, unless it is rough all over.
@@ -322,6 +423,7 @@ fn said(
 ) -> (Option<Fault>, u64, Vec<Warning>) {
     let params = Params { tile: (edge / 2).max(16), max_spp: 1 << 30, min_spp: 0, ..Params::default() };
     let mut session = Session::new(edge, edge, FixedSpp(1 << 29), params).unwrap();
+    session.set_linear();
     let mut had = 0;
     for &size in sizes {
         let (spp, image) = batch(had, size);
@@ -489,7 +591,7 @@ fn numbers_that_are_too_coarse_are_noticed() {
         });
         assert_eq!((fault, &warnings[..]), (None, &[Warning::Rounded(Precision::Floats { bits })][..]));
     }
-    // Integers of 10 and 16 bits
+    // Integers of 8, 10, 12 and 16 bits, over the largest or one more
     let integers = |white: f32, encoded: bool| {
         changed(60, move |image| {
             for c in image.iter_mut().flatten() {
@@ -501,9 +603,19 @@ fn numbers_that_are_too_coarse_are_noticed() {
     };
     for encoded in [false, true] {
         let bits = |bits| Precision::Integers { bits, whole: false };
-        assert_eq!(integers(1023.0, encoded).0, Some(Fault::Rounded(bits(10))));
-        let (fault, _, warnings) = integers(65_535.0, encoded);
-        assert!(fault.is_none() && warnings.contains(&Warning::Rounded(bits(16))), "{fault:?} {warnings:?}");
+        let encoding = if encoded { Encoding::Srgb } else { Encoding::Linear };
+        assert_eq!(integers(256.0, encoded).0, Some(Fault::Quantised { encoding }));
+        for (white, of) in [(1023.0, 10), (1024.0, 10), (4095.0, 12), (4096.0, 12)] {
+            assert_eq!(integers(white, encoded).0, Some(Fault::Rounded(bits(of))), "{white}, {encoded}");
+        }
+        for white in [65_535.0, 65_536.0] {
+            let (fault, _, warnings) = integers(white, encoded);
+            assert_eq!(
+                (fault, &warnings[..]),
+                (None, &[Warning::Rounded(bits(16))][..]),
+                "{white}, {encoded}"
+            );
+        }
     }
     // The bits of half floats, taken for numbers
     let bits = |image: &mut Vec<Rgb>| {
@@ -516,7 +628,7 @@ fn numbers_that_are_too_coarse_are_noticed() {
 #[test]
 fn few_samples_of_few_values_are_not_coarse() {
     for spp in [1, 8, 15, 16, 17, 64, 255, 256, 1024] {
-        let occlusion = |count: u64| {
+        let occlusion = |count: u64, spp: u64| {
             let mut noise = Noise::keyed(&[count, spp]);
             let mut pixel = |i: usize| {
                 let open = 0.2 + 0.7 * (i % EDGE) as f64 / EDGE as f64;
@@ -529,14 +641,15 @@ fn few_samples_of_few_values_are_not_coarse() {
                 };
                 [hits as f32 / spp as f32; 3]
             };
-            (spp, (0..EDGE * EDGE).map(&mut pixel).collect())
+            (0..EDGE * EDGE).map(&mut pixel).collect()
         };
-        let (fault, _, warnings) = feed(5 * spp, occlusion);
-        let coarse = |w: &Warning| matches!(w, Warning::Rounded(_));
-        // 255 samples of 0 or 1 are what pictures of 8 bits are
-        let looks_like_bytes = spp == 255;
-        assert_eq!(fault.is_some(), looks_like_bytes, "{spp}: {fault:?}");
-        assert!(!warnings.iter().any(coarse), "{spp}: {warnings:?}");
+        // 255 samples of 0 or 1 are what pictures of 8 bits are, but for their number
+        let (fault, _, warnings) = feed(5 * spp, |count| (spp, occlusion(count, spp)));
+        assert_eq!((fault, warnings), (None, Vec::new()), "{spp}");
+        // As a session asks for them from one sample on
+        let sizes = |count: u64| spp << (count / 2).min(3);
+        let (fault, _, warnings) = feed(20 * spp, |count| (sizes(count), occlusion(count, sizes(count))));
+        assert_eq!((fault, warnings), (None, Vec::new()), "{spp}, more and more");
     }
 }
 
@@ -600,23 +713,20 @@ fn counts_that_are_behind_the_picture_are_noticed() {
     }
 }
 
-/// What a session is told, it does not ask: nothing above 1, in passes of one size.
+/// What a session is told, it does not ask.
 #[test]
 fn what_values_are_is_asked_once_where_nothing_tells() {
-    let dim = |image: &mut Vec<Rgb>| image.iter_mut().flatten().for_each(|c| *c = 0.1 * c.min(9.0));
-    assert_eq!(changed(100, dim), (None, 100, vec![Warning::Unsaid]));
-    let sizes = |count: u64| SPP + count / 4;
-    assert_eq!(feed(100, |count| (sizes(count), batch(count + 1, sizes(count)))).2, []);
-    let mut session =
-        Session::new(EDGE, EDGE, FixedSpp(1 << 20), Params { tile: 64, ..Params::default() }).unwrap();
-    session.set_linear();
-    for count in 0..8 {
-        let mut image = batch(count + 1, SPP);
-        dim(&mut image);
-        session.push_image(SPP, &image).unwrap();
-        session.look().unwrap();
+    // Light above 1 tells nothing: half floats hold what is encoded, too
+    for brightness in [0.1, 9.0] {
+        let same = |count| {
+            let pixel = |pixel: Rgb| pixel.map(|c| brightness * c.min(9.0));
+            (SPP, batch(count + 1, SPP).into_iter().map(pixel).collect())
+        };
+        assert_eq!(fed(false, 100, same), (None, 100, vec![Warning::Unsaid]));
+        assert_eq!(fed(true, 100, same), (None, 100, Vec::new()));
     }
-    assert_eq!(session.warnings(), []);
+    let sizes = |count: u64| SPP + count / 4;
+    assert_eq!(fed(false, 100, |count| (sizes(count), batch(count + 1, sizes(count)))).2, []);
 }
 
 #[test]
@@ -651,6 +761,7 @@ fn tiles_that_were_mixed_up_do_not_fit() {
     let warnings = |from: &dyn Fn(Tile, TileGrid, usize, usize) -> (usize, usize)| {
         let params = Params { tile: 32, max_spp: 1 << 30, min_spp: 0, ..Params::default() };
         let mut session = Session::new(EDGE, EDGE, FixedSpp(1 << 29), params).unwrap();
+        session.set_linear();
         let grid = session.film().grid();
         for (round, tile) in (0..8).flat_map(|round| grid.tiles().map(move |tile| (round, tile))) {
             let pixel = |i: usize| {

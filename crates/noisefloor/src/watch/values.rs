@@ -1,6 +1,6 @@
 //! The values of the first batches by themselves.
 
-use super::said::{Encoding, Precision, Warning};
+use super::said::{Encoding, Precision};
 use crate::display::{luminance, srgb_encode};
 use crate::rgb::Rgb;
 use rayon::prelude::*;
@@ -11,9 +11,7 @@ use std::iter::Sum;
 /// Watched values without which nothing is said about values.
 const LEAST_VALUES: u64 = 64;
 
-/// Distance from a whole number of 255ths that is rounding.
-const NEAR: f32 = 4e-3;
-/// Different numbers of 8 bits, besides 0 and 255, without which it is not said that values are such.
+/// Different numbers, besides 0 and the largest, without which it is not said that values are such.
 const LEAST_LEVELS: u32 = 8;
 
 /// What the watched values of the first batches have in common.
@@ -21,25 +19,34 @@ const LEAST_LEVELS: u32 = 8;
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Values {
     seen: u64,
-    /// How many are 8-bit numbers, and which: divided by 255, sRGB-decoded, whole.
-    levels: [Levels; 3],
-    /// How many are integers of more bits, as [`STEPS`] has them.
-    finer: [Steps; STEPS.len()],
+    /// How many are integers, as [`STEPS`] has them.
+    steps: [Steps; STEPS.len()],
     digits: Digits,
-    first: Option<Rgb>,
-    varied: bool,
-    pub(super) above_one: bool,
+    above_one: bool,
 }
 
-/// Integers of more than 8 bits that pictures are stored in: what 1 is, the bits, whether they are sRGB-encoded, and
-/// how far from a whole number rounding leads. 24 bits of a float leave 16 of an integer uncertain by 0.004, and
-/// what `srgb_encode` errs by is 0.07 of their steps; of 64 other values, all lie as near with p < 10⁻³³.
-const STEPS: [(f32, u32, bool, f32); 5] = [
-    (1023.0, 10, false, NEAR),
-    (1023.0, 10, true, NEAR),
-    (65_535.0, 16, false, 0.02),
-    (65_535.0, 16, true, 0.15),
-    (1.0, 16, false, 0.0),
+/// Integers that pictures are stored in: what 1 is, or 0 for whole numbers, the bits, whether they are sRGB-encoded, and how
+/// far from a whole number rounding leads. 24 bits of a float leave 16 of an integer uncertain by 0.004, and what
+/// `srgb_encode` errs by is 0.07 of their steps; of 64 other values, all lie as near with p < 10⁻³³.
+const STEPS: [(u32, u32, bool, f32); 18] = [
+    (255, 8, false, 0.004),
+    (256, 8, false, 0.004),
+    (0, 8, false, 0.004),
+    (255, 8, true, 0.004),
+    (256, 8, true, 0.004),
+    (1023, 10, false, 0.004),
+    (1024, 10, false, 0.004),
+    (1023, 10, true, 0.004),
+    (1024, 10, true, 0.004),
+    (4095, 12, false, 0.004),
+    (4096, 12, false, 0.004),
+    (4095, 12, true, 0.02),
+    (4096, 12, true, 0.02),
+    (65_535, 16, false, 0.02),
+    (65_536, 16, false, 0.02),
+    (65_535, 16, true, 0.15),
+    (65_536, 16, true, 0.15),
+    (0, 16, false, 0.0),
 ];
 
 /// The greatest common divisor; of 0 and a number, the number.
@@ -69,6 +76,8 @@ struct Digits {
     most: u32,
     with_most: [u32; 4],
     all: [u32; 4],
+    /// Which significands, modulo 61.
+    which: u64,
 }
 
 /// Digits from which values are those of 32-bit floats: half floats have 11, and small floats of 10 and 11 bits, and
@@ -83,7 +92,9 @@ impl Digits {
             return;
         }
         let bits = value.to_bits();
-        let digits = 24 - (bits & 0x007f_ffff | 0x0080_0000).trailing_zeros();
+        let significand = bits & 0x007f_ffff | 0x0080_0000;
+        let digits = 24 - significand.trailing_zeros();
+        self.which |= 1 << (significand >> significand.trailing_zeros()) % 61;
         let binade = (bits >> 23) as usize % 4;
         self.all[binade] += 1;
         self.take(digits);
@@ -99,6 +110,7 @@ impl Digits {
 
     fn add(&mut self, more: &Self) {
         self.take(more.most);
+        self.which |= more.which;
         for binade in 0..4 {
             self.all[binade] += more.all[binade];
             if more.most == self.most {
@@ -108,45 +120,18 @@ impl Digits {
     }
 
     /// The bits of the significand that all values were rounded to. Sums of n samples that are 0 or 1, over n, have
-    /// few digits as well, but the same last place in each binade, and so the last digit in the uppermost alone.
+    /// few digits as well, but the same last place in each binade, and so the last digit in the uppermost alone; those of
+    /// a few n have few significands.
     fn rounded(&self) -> Option<u32> {
         let is_used = |&(with_most, all): &(u32, u32)| all >= LEAST_IN_BINADE && 4 * with_most > all;
         let used = self.with_most.into_iter().zip(self.all).filter(is_used).count();
-        (self.most <= FEW_DIGITS && used >= 2).then_some(self.most)
-    }
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
-struct Levels {
-    count: u64,
-    /// As of [`Steps`].
-    multiples: u32,
-    which: [u64; 4],
-}
-
-impl Levels {
-    fn see(&mut self, level: f32) {
-        let near = level.round();
-        if (level - near).abs() <= NEAR && (0.0..=255.0).contains(&near) {
-            self.count += 1;
-            let number = near as usize;
-            self.multiples = divisor(self.multiples, number as u32);
-            self.which[number / 64] |= 1 << (number % 64);
-        }
-    }
-
-    fn are_all(&self, of: u64) -> bool {
-        let [low, .., high] = self.which;
-        let ends = (low & 1).count_ones() + (high >> 63) as u32;
-        let levels: u32 = self.which.iter().map(|word| word.count_ones()).sum();
-        self.count == of && levels - ends >= LEAST_LEVELS && self.multiples == 1
+        (self.most <= FEW_DIGITS && used >= 2 && self.which.count_ones() >= LEAST_LEVELS).then_some(self.most)
     }
 }
 
 impl Steps {
-    fn see(&mut self, level: f32, bits: u32, near: f32) {
-        let (whole, most) = (level.round(), (1u32 << bits) - 1);
+    fn see(&mut self, level: f32, most: u32, near: f32) {
+        let whole = level.round();
         if (level - whole).abs() <= near && (0.0..=most as f32).contains(&whole) {
             self.count += 1;
             let number = whole as u32;
@@ -159,26 +144,18 @@ impl Steps {
 }
 
 impl Values {
-    pub(super) fn see(&mut self, pixel: Rgb) {
-        let first = *self.first.get_or_insert(pixel);
-        self.varied |= first.map(f32::to_bits) != pixel.map(f32::to_bits);
+    /// Takes notice of a mean of `spp` samples. Where samples are 0 or 1, it is one of as many steps, and no picture's.
+    pub(super) fn see(&mut self, pixel: Rgb, spp: u64) {
         for value in pixel {
             self.seen += 1;
             self.above_one |= value > 1.0;
             // Once a value is none, no others need be looked at
-            if self.levels[0].count + 1 == self.seen {
-                self.levels[0].see(255.0 * value);
-            }
-            if self.levels[1].count + 1 == self.seen && (0.0..=1.0).contains(&value) {
-                self.levels[1].see(255.0 * srgb_encode(value));
-            }
-            if self.levels[2].count + 1 == self.seen {
-                self.levels[2].see(value);
-            }
-            for (steps, (white, bits, encoded, near)) in self.finer.iter_mut().zip(STEPS) {
-                if steps.count + 1 == self.seen && (!encoded || (0.0..=1.0).contains(&value)) {
-                    let level = white * if encoded { srgb_encode(value) } else { value };
-                    steps.see(level, bits, near);
+            for (steps, (white, bits, encoded, near)) in self.steps.iter_mut().zip(STEPS) {
+                let explained = !encoded && u64::from(white) == spp;
+                if steps.count + 1 == self.seen && !explained && (!encoded || (0.0..=1.0).contains(&value)) {
+                    let (white, most) = if white > 0 { (white, white) } else { (1, (1 << bits) - 1) };
+                    let level = white as f32 * if encoded { srgb_encode(value) } else { value };
+                    steps.see(level, most, near);
                 }
             }
             self.digits.see(value);
@@ -188,51 +165,36 @@ impl Values {
     /// Takes together what was seen of other tiles.
     pub(super) fn add(&mut self, more: &Self) {
         self.seen += more.seen;
-        for (levels, more) in self.levels.iter_mut().zip(more.levels) {
-            levels.count += more.count;
-            levels.multiples = divisor(levels.multiples, more.multiples);
-            levels.which.iter_mut().zip(more.which).for_each(|(which, more)| *which |= more);
-        }
-        for (steps, more) in self.finer.iter_mut().zip(&more.finer) {
+        for (steps, more) in self.steps.iter_mut().zip(&more.steps) {
             (steps.count, steps.which) = (steps.count + more.count, steps.which | more.which);
             steps.multiples = divisor(steps.multiples, more.multiples);
         }
         self.digits.add(&more.digits);
-        let differs = |(one, other): (Rgb, Rgb)| one.map(f32::to_bits) != other.map(f32::to_bits);
-        self.varied |= more.varied || self.first.zip(more.first).is_some_and(differs);
-        self.first = self.first.or(more.first);
         self.above_one |= more.above_one;
+    }
+
+    /// What integers all values are, if they are: what white is, their bits, whether they are sRGB-encoded.
+    fn integers(&self) -> Option<(u32, u32, bool)> {
+        let are_all = |Steps { count, multiples, which }: &Steps| {
+            *count == self.seen && *multiples == 1 && which.count_ones() >= LEAST_LEVELS
+        };
+        let found =
+            self.steps.iter().zip(STEPS).find(|(steps, _)| self.seen >= LEAST_VALUES && are_all(steps));
+        found.map(|(_, (white, bits, encoded, _))| (white, bits, encoded))
     }
 
     /// How all values are 8-bit numbers, if they are.
     pub(super) fn quantised(&self) -> Option<Encoding> {
-        if self.seen < LEAST_VALUES {
-            return None;
-        }
-        let [linear, srgb, whole] = self.levels.map(|levels| levels.are_all(self.seen));
-        if linear || whole { Some(Encoding::Linear) } else { srgb.then_some(Encoding::Srgb) }
+        let (_, bits, encoded) = self.integers()?;
+        (bits == 8).then_some(if encoded { Encoding::Srgb } else { Encoding::Linear })
     }
 
-    /// What coarser numbers all values are, if they are: of more than 8 bits.
+    /// What coarser numbers all values are, if they are.
     pub(super) fn precision(&self) -> Option<Precision> {
-        if self.seen < LEAST_VALUES {
-            return None;
-        }
-        let are_all = |steps: &&(Steps, (f32, u32, bool, f32))| {
-            let Steps { count, multiples, which } = steps.0;
-            count == self.seen && multiples == 1 && which.count_ones() >= LEAST_LEVELS
-        };
-        let found = self.finer.into_iter().zip(STEPS).collect::<Vec<_>>();
-        let integers = found
-            .iter()
-            .find(are_all)
-            .map(|&(_, (white, bits, ..))| Precision::Integers { bits, whole: white == 1.0 });
-        integers.or_else(|| self.digits.rounded().map(|bits| Precision::Floats { bits }))
-    }
-
-    pub(super) fn constant(&self) -> Option<Warning> {
-        let said = self.seen >= LEAST_VALUES && !self.varied;
-        self.first.filter(|_| said).map(Warning::Constant)
+        let integers =
+            self.integers().map(|(white, bits, _)| Precision::Integers { bits, whole: white == 0 });
+        let floats = || self.digits.rounded().filter(|_| self.seen >= LEAST_VALUES);
+        integers.or_else(|| floats().map(|bits| Precision::Floats { bits }))
     }
 }
 
@@ -284,8 +246,8 @@ impl PictureValues {
         let of_part = |(one, other): (&[Rgb], &[Rgb])| {
             let mut part = Self::default();
             for (&a, &b) in one.iter().zip(other) {
-                part.values.see(a);
-                part.values.see(b);
+                part.values.see(a, 0);
+                part.values.see(b, 0);
                 part.ends.add(Ends::of(luminance(a), luminance(b)));
             }
             part
