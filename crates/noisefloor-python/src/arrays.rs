@@ -4,6 +4,7 @@ use crate::errors::{ParameterError, PictureError, SizeError};
 use noisefloor::{Rgb, display::srgb_decode};
 use numpy::ndarray::{Array2, Array3, Axis};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use std::borrow::Cow;
 use std::thread;
@@ -179,7 +180,10 @@ fn from_device<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Option<Bound<'
     match device {
         Some(device) if READABLE.contains(&device) => {
             // Of a kind that DLPack cannot say, such as one with gradients, numpy may know more
-            return Ok(numpy.call_method1("from_dlpack", (object,)).ok());
+            let array = numpy.call_method1("from_dlpack", (object,));
+            return array.map(Some).or_else(|error| {
+                if error.is_instance_of::<PyException>(py) { Ok(None) } else { Err(error) }
+            });
         }
         None if !object.hasattr("__cuda_array_interface__")? => return Ok(None),
         _ => {}
@@ -217,7 +221,11 @@ fn array<'py>(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         Ok(None) => py.import("numpy")?.call_method1("asarray", (object,)),
         Err(error) => Err(error),
     };
-    let array = array.map_err(|error| SizeError::new_err(format!("no array of pixels: {error}")))?;
+    // What is no `Exception`, such as Ctrl-C, says nothing of the array
+    let array = array.map_err(|error| match error.is_instance_of::<PyException>(py) {
+        true => SizeError::new_err(format!("no array of pixels: {error}")),
+        false => error,
+    })?;
     let shape = array.getattr("shape")?;
     match shape.extract::<Vec<usize>>()?[..] {
         [_, _, 3] => Ok(array),

@@ -11,6 +11,7 @@ use noisefloor::background::{Background, News, WhenFull};
 use noisefloor::session::SessionError;
 use pyo3::prelude::*;
 use std::process;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// Judges a Session on a thread of its own: the renderer hands over a pass and goes on.
 ///
@@ -27,10 +28,22 @@ use std::process;
 #[pyclass(frozen, name = "Background", module = "noisefloor")]
 pub(crate) struct PyBackground {
     /// Taken when this object is dropped.
-    background: Option<Background<Criterion>>,
+    background: Option<Arc<Background<Criterion>>>,
     session: Py<PySession>,
     /// The one that has the thread.
     process: u32,
+}
+
+/// Those that may have a thread, and its process.
+static RUNNING: Mutex<Vec<(u32, Weak<Background<Criterion>>)>> = Mutex::new(Vec::new());
+
+/// Ends all threads, when the script has ended and the interpreter has not: it would end a thread within a denoiser by
+/// unwinding it, which aborts the process.
+#[pyfunction]
+pub(crate) fn stop_all(py: Python<'_>) {
+    let all = std::mem::take(&mut *RUNNING.lock().unwrap_or_else(PoisonError::into_inner));
+    let here = all.into_iter().filter(|(process, _)| *process == process::id());
+    py.detach(|| here.filter_map(|(_, background)| background.upgrade()).for_each(|running| running.stop()));
 }
 
 impl PyBackground {
@@ -38,7 +51,7 @@ impl PyBackground {
     fn here(&self) -> PyResult<&Background<Criterion>> {
         not_while_denoising()?;
         let elsewhere = || Error::new_err("the session judges in the process that this one was forked off");
-        self.background.as_ref().filter(|_| self.process == process::id()).ok_or_else(elsewhere)
+        self.background.as_deref().filter(|_| self.process == process::id()).ok_or_else(elsewhere)
     }
 
     /// A copy of an image.
@@ -79,7 +92,11 @@ impl PyBackground {
         };
         let lent = session.get().lend(py)?;
         let background = Background::new_in(lent, waiting, when_full, |work| pool::run(work));
-        Ok(Self { background: Some(background.map_err(Raise::raise)?), session, process: process::id() })
+        let (background, process) = (Arc::new(background.map_err(Raise::raise)?), process::id());
+        let mut all = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|(_, other)| other.strong_count() > 0);
+        all.push((process, Arc::downgrade(&background)));
+        Ok(Self { background: Some(background), session, process })
     }
 
     /// Adds the mean of spp new samples per pixel of the whole picture to the pass. It is copied.

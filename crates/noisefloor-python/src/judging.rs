@@ -251,15 +251,18 @@ impl Denoiser for Function {
     }
 
     fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
-        Python::attach(|py| {
+        let failed = |cause: String| DenoiseError::Failed { name: self.name.clone(), cause: cause.into() };
+        // The script may have ended, and with it the interpreter, before the session has
+        let made = Python::try_attach(|py| {
             DENOISING.set(true);
             let answer = self.call(py, picture);
             DENOISING.set(false);
             answer.map_err(|error| {
-                let cause = error.to_string().into();
+                let cause = error.to_string();
                 *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-                DenoiseError::Failed { name: self.name.clone(), cause }
+                failed(cause)
             })
-        })
+        });
+        made.unwrap_or_else(|| Err(failed("the interpreter has ended".into())))
     }
 }

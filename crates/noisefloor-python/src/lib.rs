@@ -72,6 +72,8 @@ mod _noisefloor {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let stop = wrap_pyfunction!(crate::background::stop_all, module)?;
+        module.py().import("atexit")?.call_method1("register", (stop,))?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
