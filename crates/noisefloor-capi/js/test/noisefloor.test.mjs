@@ -438,19 +438,3 @@ test("half floats mean what they are", () => {
   assert.ok(zero === 0 && Math.abs(third - 1 / 3) < 1e-4);
   session.close();
 });
-
-test("running means as totals are a fault", () => {
-  const [session, random] = [new Session(64, 64, { ...options, linear: true }), noise(5)];
-  const sum = new Float64Array(3 * 64 * 64);
-  let count = 0;
-  const pass = () => {
-    count += 16;
-    batch(64 * 64, 16, random).forEach((value, i) => (sum[i] += 16 * value));
-    session.push(sum.map((value) => value / count), { spp: count });
-    assert.deepEqual(session.judge(), []);
-  };
-  assert.throws(() => {
-    for (let i = 0; i < 12; i++) pass();
-  }, { code: "FAULT", message: /contain the samples/ });
-  session.close();
-});

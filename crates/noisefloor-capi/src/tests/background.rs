@@ -104,37 +104,6 @@ fn stops_are_those_of_a_session_that_waits() {
 }
 
 #[test]
-fn running_means_are_those_of_a_session_that_waits() {
-    let (plain, session) = (session(&params()), session(&params()));
-    let background = begin(&session, 1, NF_FULL_WAIT);
-    let (mut total, mut sums) = (0, vec![0.0f64; 4 * PIXELS]);
-    for pass in 0..12 {
-        let spp = 8 + pass;
-        total += spp;
-        sums.iter_mut().zip(image(pass, spp, 4)).for_each(|(sum, mean)| *sum += spp as f64 * f64::from(mean));
-        let mean: Vec<f32> = sums.iter().map(|sum| (sum / total as f64) as f32).collect();
-        for request in requests(&plain) {
-            let rows = tile(request.tile).rows(WIDTH).flatten();
-            let of_tile: Vec<f32> = rows.flat_map(|pixel| mean[4 * pixel..][..3].to_vec()).collect();
-            let (index, floats) = (request.tile.index, of_tile.len());
-            // SAFETY: a living handle, and an array of the size given.
-            let status = unsafe { nf_session_push_running(plain.0, index, total, of_tile.as_ptr(), floats) };
-            assert_eq!(status, NfStatus::Ok, "{}", message());
-        }
-        // SAFETY: a living handle, and NULL where it is allowed.
-        assert_eq!(unsafe { nf_session_judge(plain.0, null_mut()) }, NfStatus::Ok, "{}", message());
-        // SAFETY: an array of the size given.
-        let status =
-            unsafe { nf_background_push_running_image(background, total, mean.as_ptr(), mean.len(), 4) };
-        assert_eq!(status, NfStatus::Ok, "{}", message());
-        assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
-    }
-    assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
-    assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
-    assert_eq!(states(&session), states(&plain));
-}
-
-#[test]
 fn faults_and_wrong_calls_are_said() {
     let session = session(&params());
     let mut background = null_mut();
@@ -152,23 +121,40 @@ fn faults_and_wrong_calls_are_said() {
     assert_eq!(requests(&session)[0].first, 0);
 }
 
-/// Noise that nobody could overlook: no tile stops before the limit.
+/// Noise that nobody could overlook, so that no tile stops before the limit, as batches and as running means.
 #[test]
 fn what_is_left_is_said() {
-    let session = session(&NfParams { max_spp: 100, ..params() });
-    let background = begin(&session, 4, NF_FULL_WAIT);
-    let mut noise = noisefloor_testkit::Noise::new(63);
-    let mut left = 100;
-    assert_eq!(state(background).spp_left, left);
-    for spp in [20, 30, 12, 38] {
-        let image: Vec<f32> = (0..3 * PIXELS).map(|_| (0.5 + 0.4 * noise.normal().abs()) as f32).collect();
-        assert_eq!(push_image(background, spp, &image), NfStatus::Ok, "{}", message());
-        assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
-        left -= spp;
-        assert_eq!(state(background).spp_left, left, "judged or not");
+    for running in [false, true] {
+        let session = session(&NfParams { max_spp: 100, ..params() });
+        let background = begin(&session, 4, NF_FULL_WAIT);
+        let mut noise = noisefloor_testkit::Noise::new(63);
+        let (mut had, mut sums) = (0, vec![0.0f32; 3 * PIXELS]);
+        assert_eq!(state(background).spp_left, 100);
+        for spp in [20, 30, 12, 38] {
+            let new: Vec<f32> = (0..3 * PIXELS).map(|_| (0.5 + 0.4 * noise.normal().abs()) as f32).collect();
+            sums.iter_mut().zip(&new).for_each(|(sum, new)| *sum += spp as f32 * new);
+            had += spp;
+            let mean: Vec<f32> = sums.iter().map(|sum| sum / had as f32).collect();
+            let status = match running {
+                // SAFETY: an array of the size given.
+                true => unsafe {
+                    nf_background_push_running_image(background, had, mean.as_ptr(), mean.len(), 3)
+                },
+                false => push_image(background, spp, &new),
+            };
+            assert_eq!(status, NfStatus::Ok, "{}", message());
+            assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
+            assert_eq!(state(background).spp_left, 100 - had, "judged or not");
+        }
+        assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
+        let NfBackgroundState { next_pass, spp_left, open_tiles, .. } = state(background);
+        assert_eq!((next_pass, spp_left, open_tiles), (0, 0, 0));
+        assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
+        let far = super::image(&session)
+            .iter()
+            .zip(&sums)
+            .map(|(a, sum)| (a - sum / 100.0).abs())
+            .fold(0.0, f32::max);
+        assert!(far < 1e-5, "{far}");
     }
-    assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
-    let NfBackgroundState { next_pass, spp_left, open_tiles, .. } = state(background);
-    assert_eq!((next_pass, spp_left, open_tiles), (0, 0, 0));
-    assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
 }

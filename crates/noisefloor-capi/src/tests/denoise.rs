@@ -126,11 +126,7 @@ fn stops_are_those_of_rust_and_go_on_after_a_resume() {
     let quality = DenoisedQuality::new(Rows, DEFAULT_JODS_LOST);
     let mut expected = Session::new(WIDTH, HEIGHT, quality, rust).unwrap();
     while !expected.is_done() {
-        for request in expected.requests() {
-            let mean = render(request.tile, request.first, request.spp);
-            expected.push(request.tile.index, request.spp, mean.as_chunks().0).unwrap();
-        }
-        expected.judge().unwrap();
+        round_in_rust(&mut expected);
     }
     let verdicts: Vec<Verdict> =
         expected.film().grid().tiles().map(|t| expected.verdict(t.index).unwrap()).collect();

@@ -1,6 +1,5 @@
 use crate::kit::{FILES, column, json, succeed, table, text, tiny};
 use noisefloor_image::{Picture, read_exr, read_picture};
-use std::path::Path;
 use tempfile::tempdir;
 
 const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar,jods_lost";
@@ -94,43 +93,13 @@ fn the_same_seed_gives_the_same_files_whatever_the_threads() {
     assert!(one != render("other", "4", "2"), "the same picture from another seed");
 }
 
-/// Spaced verdicts stop tiles sooner, and a render may be interrupted between them.
-#[test]
-fn spaced_verdicts_stop_tiles_sooner() {
-    let folder = tempdir().unwrap();
-    let render = |name: &str, more: &[&str]| {
-        let out = folder.path().join(name);
-        // More than the 100 samples that small pictures get in any case
-        let scene = ["render", "glass-spheres", "--size", "32x32", "--tile", "16", "--max-spp", "4000"];
-        let some = ["--people", "50%", "--autosave", "0", "--quiet", "--out", text(&out)];
-        succeed(&[&scene[..], &some, more].concat());
-        out
-    };
-    let samples = |out: &Path| json(&out.join("report.json"))["samples"].as_u64().unwrap();
-    let (spaced, every) = (render("spaced", &[]), render("every", &["--schedule", "every"]));
-    assert!(samples(&spaced) < samples(&every), "{} {}", samples(&spaced), samples(&every));
-    let (_, rows) = table(&spaced.join("stops.csv"));
-    let stops: Vec<u64> = rows.iter().map(|row| row[5].parse().unwrap()).collect();
-    assert!(stops.iter().all(|spp| *spp >= 16 && spp.is_multiple_of(8)), "{stops:?}");
-    assert!(stops.iter().any(|spp| !spp.is_multiple_of(100)), "{stops:?}");
-
-    let files = |out: &Path| ["image.exr", "stops.csv"].map(|name| std::fs::read(out.join(name)).unwrap());
-    let mut parts = render("parts", &["--time", "0.001"]);
-    for _ in 0..50 {
-        if json(&parts.join("report.json"))["complete"] == true {
-            break;
-        }
-        parts = render("parts", &["--time", "0.001", "--resume"]);
-    }
-    assert!(files(&spaced) == files(&parts), "another picture in parts");
-}
-
 #[test]
 fn a_fixed_number_of_samples() {
     let folder = tempdir().unwrap();
-    succeed(&tiny(text(folder.path()), &["bulb", "--criterion", "spp:100"]));
+    // No multiple of a batch
+    succeed(&tiny(text(folder.path()), &["bulb", "--criterion", "spp:150"]));
     let stops = folder.path().join("stops.csv");
-    assert_eq!(column(&stops, "spp"), ["100"; 4]);
+    assert_eq!(column(&stops, "spp"), ["150"; 4]);
     // Nobody has looked at the noise
     assert_eq!(column(&stops, "reason"), ["reached-spp"; 4]);
     assert_eq!(column(&stops, "probability"), [""; 4]);
@@ -191,16 +160,6 @@ fn time_is_kept() {
     assert!(report["seconds_total"].as_f64().unwrap() >= 0.5, "{report}");
     assert_eq!(column(&folder.path().join("stops.csv"), "reason"), ["time-limit"; 4]);
     assert_eq!(report["complete"], false);
-}
-
-#[test]
-fn a_fixed_number_of_samples_need_not_be_a_multiple_of_the_batch() {
-    let folder = tempdir().unwrap();
-    for spp in ["30", "150"] {
-        let criterion = format!("spp:{spp}");
-        succeed(&tiny(text(folder.path()), &["--criterion", &criterion, "--force"]));
-        assert_eq!(column(&folder.path().join("stops.csv"), "spp"), [spp; 4]);
-    }
 }
 
 /// A scene file is rendered as it says, and named after its file.
