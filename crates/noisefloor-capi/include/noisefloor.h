@@ -76,6 +76,24 @@
 // Closed by the caller: the renderer failed.
 #define NF_REASON_FAILED 5
 
+// Nothing keeps the tile open.
+#define NF_OPEN_FOR_NOTHING 0
+
+// What is wrong with the tile, mostly its noise, would be seen.
+#define NF_OPEN_FOR_NOISE 1
+
+// The exposure of the picture is not known well enough.
+#define NF_OPEN_FOR_EXPOSURE 2
+
+// Of light that few samples have met elsewhere, as much as the tile is likely to lack would be seen.
+#define NF_OPEN_FOR_UNMET_LIGHT 3
+
+// So few samples that neither noise in few pixels is known yet, nor what light none of them has met.
+#define NF_OPEN_FOR_FEW_SAMPLES 4
+
+// Doubts about the samples themselves: see the warnings.
+#define NF_OPEN_FOR_DOUBT 5
+
 // The search goes on.
 #define NF_SEARCH_SEARCHING 0
 
@@ -253,11 +271,10 @@ typedef struct {
     float probability;
     // NF_REASON_OPEN, or why the tile is done.
     uint32_t reason;
+    // What keeps the tile from being done, or has kept it until a limit: NF_OPEN_FOR_NOTHING, or another of these.
+    uint32_t open_for;
     // Whether the tile's texture is unlike all that the model was trained on: treat the verdict with care.
     bool unfamiliar;
-    // Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would
-    // be seen here.
-    bool unmet;
 } NfTileState;
 
 // What samples were like that were pushed.

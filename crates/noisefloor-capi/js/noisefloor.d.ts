@@ -144,10 +144,10 @@ export interface TileState {
   probability: number | null;
   /** "open", or why the tile is done. */
   reason: "open" | "converged" | "maxSpp" | "timeLimit" | "cancelled" | "failed";
+  /** What keeps the tile from being done, or has kept it until a limit. */
+  openFor: null | "noise" | "exposure" | "unmetLight" | "fewSamples" | "doubt";
   /** Whether the texture is unlike all that the model was trained on: treat the verdict with care. */
   unfamiliar: boolean;
-  /** Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would be seen here. */
-  unmet: boolean;
 }
 
 /** How pixels lie in an array. */

@@ -98,7 +98,7 @@ STRUCTS.NfParams = struct(
 STRUCTS.NfTile = struct("size_t index; size_t x; size_t y; size_t width; size_t height");
 STRUCTS.NfRequest = struct("NfTile tile; uint64_t first; uint64_t spp; uint32_t sequence; uint64_t point");
 STRUCTS.NfTileState = struct(
-  "uint64_t spp; uint64_t expected_spp; float probability; uint32_t reason; bool unfamiliar; bool unmet",
+  "uint64_t spp; uint64_t expected_spp; float probability; uint32_t reason; uint32_t open_for; bool unfamiliar",
 );
 STRUCTS.NfSampleCounts = struct("uint64_t rejected; uint64_t negative; size_t warnings");
 
@@ -336,6 +336,7 @@ const withOracle = (people, use) => {
 /** By number, as the header has them; so are reasons. */
 export const SCHEDULES = ["every", "spaced", "growing"];
 export const REASONS = ["open", "converged", "maxSpp", "timeLimit", "cancelled", "failed"];
+export const OPEN_FOR = [null, "noise", "exposure", "unmetLight", "fewSamples", "doubt"];
 const SRGB = 1;
 
 const position = (names, name, what) => {
@@ -579,8 +580,8 @@ export class Session {
       expectedSpp: state.expected_spp || null,
       probability: Number.isNaN(state.probability) ? null : state.probability,
       reason: REASONS[state.reason],
+      openFor: OPEN_FOR[state.open_for],
       unfamiliar: state.unfamiliar,
-      unmet: state.unmet,
     }));
   }
 

@@ -4,7 +4,7 @@ use crate::border;
 use crate::handle;
 use crate::session::NfSession;
 use crate::status::{Failure, NfStatus, guard};
-use noisefloor::{StopReason, session::Interruption, source::PixelNoise};
+use noisefloor::{StopReason, criterion::OpenFor, session::Interruption, source::PixelNoise};
 use std::ffi::c_char;
 
 /// The tile is open: it gets more samples.
@@ -20,6 +20,19 @@ pub const NF_REASON_CANCELLED: u32 = 4;
 /// Closed by the caller: the renderer failed.
 pub const NF_REASON_FAILED: u32 = 5;
 
+/// Nothing keeps the tile open.
+pub const NF_OPEN_FOR_NOTHING: u32 = 0;
+/// What is wrong with the tile, mostly its noise, would be seen.
+pub const NF_OPEN_FOR_NOISE: u32 = 1;
+/// The exposure of the picture is not known well enough.
+pub const NF_OPEN_FOR_EXPOSURE: u32 = 2;
+/// Of light that few samples have met elsewhere, as much as the tile is likely to lack would be seen.
+pub const NF_OPEN_FOR_UNMET_LIGHT: u32 = 3;
+/// So few samples that neither noise in few pixels is known yet, nor what light none of them has met.
+pub const NF_OPEN_FOR_FEW_SAMPLES: u32 = 4;
+/// Doubts about the samples themselves: see the warnings.
+pub const NF_OPEN_FOR_DOUBT: u32 = 5;
+
 /// Where a tile stands.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,11 +47,21 @@ pub struct NfTileState {
     pub probability: f32,
     /// NF_REASON_OPEN, or why the tile is done.
     pub reason: u32,
+    /// What keeps the tile from being done, or has kept it until a limit: NF_OPEN_FOR_NOTHING, or another of these.
+    pub open_for: u32,
     /// Whether the tile's texture is unlike all that the model was trained on: treat the verdict with care.
     pub unfamiliar: bool,
-    /// Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would
-    /// be seen here.
-    pub unmet: bool,
+}
+
+fn open_for_code(open_for: Option<OpenFor>) -> u32 {
+    match open_for {
+        None => NF_OPEN_FOR_NOTHING,
+        Some(OpenFor::Exposure) => NF_OPEN_FOR_EXPOSURE,
+        Some(OpenFor::UnmetLight) => NF_OPEN_FOR_UNMET_LIGHT,
+        Some(OpenFor::FewSamples) => NF_OPEN_FOR_FEW_SAMPLES,
+        Some(OpenFor::Doubt) => NF_OPEN_FOR_DOUBT,
+        Some(_) => NF_OPEN_FOR_NOISE,
+    }
 }
 
 fn reason_code(reason: StopReason) -> u32 {
@@ -72,8 +95,8 @@ pub unsafe extern "C" fn nf_session_states(
                 expected_spp: verdict.and_then(|v| v.expected_spp).unwrap_or(0),
                 probability: verdict.and_then(|v| v.probability).unwrap_or(f32::NAN),
                 reason: NF_REASON_OPEN,
+                open_for: open_for_code(locked.open_for(tile)),
                 unfamiliar: verdict.is_some_and(|v| v.unfamiliar),
-                unmet: verdict.is_some_and(|v| v.unmet),
             };
         }
         for stop in locked.stops() {

@@ -9,7 +9,7 @@ use crate::record::{DenoisedRecord, Done};
 use crate::unmet::unmet_error;
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
-    criterion::{CriterionError, Needs, View},
+    criterion::{CriterionError, Needs, OpenFor, View},
     display::Display,
     evidence::TilePlanes,
     unmet::Unmet,
@@ -252,17 +252,21 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         let unknown = self.record.lock().unwrap_or_else(PoisonError::into_inner).error.is_none();
         let all_errors = if unknown && parts != [all] { self.estimate(view, &[all])? } else { Vec::new() };
         let eyes = VisionModel::new(&view.viewing);
-        let limit = self.lost / stops_err_by(grid.len());
+        // An exposure that is estimated adds to what estimates err by, which 19 of 20 do by 1.645 deviations at most; what is
+        // seen grows with it, at most
+        let err_by = stops_err_by(grid.len()).ln().hypot(1.645 * view.exposure_error).exp();
+        let limits = [self.lost / err_by, self.lost / stops_err_by(grid.len())];
         let unmet = Unmet::of(view.film, view.display, view.viewing);
         let mut verdicts: Vec<Verdict> = tiles
             .par_iter()
             .map_init(VisionWorkspace::default, |room, &tile| {
                 let eyes = &mut Eyes { model: &eyes, room };
                 let here = errors.iter().find(|(part, _)| holds(*part, tile));
-                let verdict = here.map(|here| judge_tile(view, here, tile, limit, eyes))?;
+                let verdict = here.map(|here| judge_tile(view, here, tile, limits, eyes))?;
                 let dark =
                     if verdict.converged { darkness(view, &unmet, tile, self.lost, eyes) } else { None };
-                Some(dark.map_or(verdict, |expected| verdict.lacking_light().expecting(expected)))
+                let kind = unmet.kind(view.film, tile);
+                Some(dark.map_or(verdict, |expected| verdict.kept_open_by(kind).expecting(expected)))
             })
             .collect::<Option<_>>()
             .expect("each tile is in a part");
@@ -276,7 +280,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             .map_init(VisionWorkspace::default, |room, &(tile, done)| {
                 let expected = darkness(view, &unmet, tile, self.lost, &mut Eyes { model: &eyes, room })?;
                 let verdict = Verdict::new(false).with_loss(done.lost, done.undenoised);
-                Some((tile, verdict.lacking_light().expecting(expected)))
+                Some((tile, verdict.kept_open_by(unmet.kind(view.film, tile)).expecting(expected)))
             })
             .flatten()
             .collect();
@@ -290,8 +294,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         let together = self.together(view.film);
         for (tile, verdict) in tiles.iter().zip(&mut verdicts) {
             if let Some(spp) = together[tile.index] {
-                verdict.converged = false;
-                *verdict = verdict.expecting(Some(spp));
+                *verdict = verdict.kept_open_by(OpenFor::Noise).expecting(Some(spp));
             }
         }
         let mut asked = vec![false; grid.len()];
@@ -375,7 +378,7 @@ fn judge_tile(
     view: &View<'_>,
     (part, error): &PartError,
     tile: Tile,
-    limit: f64,
+    [limit, at_known_exposure]: [f64; 2],
     eyes: &mut Eyes<'_>,
 ) -> Verdict {
     let (film, spp) = (view.film, view.film.spp(tile.index));
@@ -397,7 +400,10 @@ fn judge_tile(
         let verdict = Verdict::new(evidence).expecting(Some(spp)).with_brightness(brightness_differs);
         return verdict.with_loss(of_noise, evidence);
     }
-    let verdict = Verdict::new(false).expecting(eyes.needed_by_either([&here, &noise], limit, spp));
+    let enough = evidence && lost.min(of_noise) <= at_known_exposure;
+    let why = if enough { OpenFor::Exposure } else { OpenFor::Noise };
+    let verdict = Verdict::new(false).kept_open_by(why);
+    let verdict = verdict.expecting(eyes.needed_by_either([&here, &noise], limit, spp));
     verdict.with_brightness(brightness_differs).with_loss(lost, false)
 }
 

@@ -62,6 +62,8 @@ pub struct LiveTile {
     pub probability: Option<f32>,
     /// Whether it gets more samples.
     pub open: bool,
+    /// What keeps it from being done, as reports have it; `None` if nothing does.
+    pub open_for: Option<&'static str>,
 }
 
 impl LiveState {

@@ -365,7 +365,12 @@ impl PySession {
     /// Raises BatchError if the tile does not exist.
     fn verdict(&self, py: Python<'_>, tile: TileLike) -> PyResult<Option<PyVerdict>> {
         let tile = tile.of(self.grid)?;
-        Ok(self.attached(py)?.verdict(tile.index).map(|verdict| PyVerdict::of(tile, verdict)))
+        let session = self.attached(py)?;
+        let open_for = session.open_for(tile.index);
+        Ok(session.verdict(tile.index).map(|mut verdict| {
+            verdict.open_for = open_for;
+            PyVerdict::of(tile, verdict)
+        }))
     }
 
     /// Ends every open tile for "time-limit", "cancelled" or "failed", and returns them as a list of Stop.

@@ -1,7 +1,7 @@
 //! What a session says: tiles, requests, verdicts, stops. Other processes get them pickled, and make them.
 
 use crate::errors::{BatchError, whole};
-use noisefloor::{Request, Stop, Tile, TileGrid, Verdict};
+use noisefloor::{Request, Stop, Tile, TileGrid, Verdict, criterion::OpenFor};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
@@ -174,7 +174,7 @@ type Points = (u64, u64, u64);
 
 /// What the oracle says about one tile.
 #[pyclass(frozen, eq, get_all, name = "Verdict", module = "noisefloor", from_py_object)]
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct PyVerdict {
     /// The tile.
     tile: PyTile,
@@ -189,9 +189,9 @@ pub(crate) struct PyVerdict {
     threshold: Option<Points>,
     /// Whether the tile is unlike all that the model was trained on: treat the verdict with care.
     unfamiliar: bool,
-    /// Whether the tile is open only for light that it may not have met: elsewhere, few samples have met as much as would
-    /// be seen here.
-    unmet: bool,
+    /// What keeps the tile open, or has kept it until a limit: ``"noise"``, ``"exposure"``, ``"unmet-light"``, ``"few-samples"``
+    /// or ``"doubt"``; None if nothing does.
+    open_for: Option<String>,
 }
 
 #[pymethods]
@@ -204,18 +204,27 @@ impl PyVerdict {
         expected_spp: Option<u64>,
         threshold: Option<Points>,
         unfamiliar: bool,
-        unmet: bool,
+        open_for: Option<String>,
     ) -> Self {
-        Self { tile, converged, probability, expected_spp, threshold, unfamiliar, unmet }
+        Self { tile, converged, probability, expected_spp, threshold, unfamiliar, open_for }
     }
 
-    fn __getnewargs__(&self) -> (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool, bool) {
-        let Self { tile, converged, probability, expected_spp, threshold, unfamiliar, unmet } = *self;
-        (tile, converged, probability, expected_spp, threshold, unfamiliar, unmet)
+    fn __getnewargs__(
+        &self,
+    ) -> (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool, Option<String>) {
+        let Self { tile, converged, probability, expected_spp, threshold, unfamiliar, open_for } =
+            self.clone();
+        (tile, converged, probability, expected_spp, threshold, unfamiliar, open_for)
+    }
+
+    /// Whether the tile is open only for light that it may not have met.
+    #[getter]
+    fn unmet(&self) -> bool {
+        self.open_for.as_deref() == Some(OpenFor::UnmetLight.name())
     }
 
     fn __repr__(&self) -> String {
-        let said = if self.converged { "converged" } else { "noise seen" };
+        let said = self.open_for.as_deref().map_or("converged".to_owned(), |why| format!("open for {why}"));
         let p = self.probability.map_or("unknown".to_owned(), |p| format!("{p:.3}"));
         format!("<noisefloor.Verdict: tile {}, {said}, P {p}>", self.tile.index)
     }
@@ -223,9 +232,10 @@ impl PyVerdict {
 
 impl PyVerdict {
     pub(crate) fn of(tile: Tile, verdict: Verdict) -> Self {
-        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, unmet, .. } = verdict;
+        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, open_for, .. } = verdict;
         let threshold = threshold.map(|t| (t.low, t.median, t.high));
-        Self { tile: tile.into(), converged, probability, threshold, expected_spp, unfamiliar, unmet }
+        let open_for = open_for.map(|why| why.name().to_owned());
+        Self { tile: tile.into(), converged, probability, threshold, expected_spp, unfamiliar, open_for }
     }
 }
 

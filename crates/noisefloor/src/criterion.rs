@@ -3,7 +3,7 @@
 use crate::descriptor::DescriptorError;
 use crate::display::Display;
 use crate::film::Film;
-use crate::params::{Audience, Params};
+use crate::params::Audience;
 use crate::rgb::Rgb;
 use crate::tile::{Tile, TileGrid};
 use auto_impl::auto_impl;
@@ -28,12 +28,16 @@ pub struct View<'a> {
     /// The quick reference, display-encoded, row-major over the image; present if [`Needs::reference`] is
     /// set.
     pub reference: Option<&'a [Rgb]>,
+    /// Standard error of the exposure of `display`, as a share of it: 0 where it does not depend on the picture. It falls
+    /// as samples come.
+    pub exposure_error: f64,
 }
 
 impl<'a> View<'a> {
     /// A film on the default display, for the observers of the training data, without a reference.
     pub fn new(film: &'a Film, display: &'a Display) -> Self {
-        Self { film, display, viewing: Viewing::default(), audience: Audience::TRAINED, reference: None }
+        let (viewing, audience) = (Viewing::default(), Audience::TRAINED);
+        Self { film, display, viewing, audience, reference: None, exposure_error: 0.0 }
     }
 
     /// The same on another display.
@@ -48,16 +52,10 @@ impl<'a> View<'a> {
         Self { reference: Some(reference), ..self }
     }
 
-    /// None before the display is settled.
-    pub(crate) fn of(
-        film: &'a Film,
-        display: &'a Option<Display>,
-        params: &Params,
-        reference: &'a Option<Vec<Rgb>>,
-    ) -> Option<Self> {
-        let (display, reference) = (display.as_ref()?, reference.as_deref());
-        let Params { viewing, audience, .. } = *params;
-        Some(Self { film, display, viewing, audience, reference })
+    /// The same with [`View::exposure_error`].
+    #[must_use]
+    pub fn exposed_within(self, exposure_error: f64) -> Self {
+        Self { exposure_error, ..self }
     }
 }
 
@@ -100,6 +98,40 @@ impl ExpectedThreshold {
     }
 }
 
+/// What keeps a tile open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "files", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum OpenFor {
+    /// What is wrong with the tile, mostly its noise, would be seen.
+    Noise,
+    /// The exposure of the picture is not known well enough: see [`View::exposure_error`].
+    Exposure,
+    /// Of light that few samples have met elsewhere, as much as the tile is likely to lack would be seen.
+    UnmetLight,
+    /// So few samples that neither noise in few pixels is known yet, nor what light none of them has met.
+    FewSamples,
+    /// Doubts about the samples themselves: the session waits with verdicts ([`crate::watch`]).
+    Doubt,
+}
+
+impl OpenFor {
+    /// All of them, in their order.
+    pub const ALL: [Self; 5] = [Self::Noise, Self::Exposure, Self::UnmetLight, Self::FewSamples, Self::Doubt];
+
+    /// As files have it, such as `unmet-light`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Noise => "noise",
+            Self::Exposure => "exposure",
+            Self::UnmetLight => "unmet-light",
+            Self::FewSamples => "few-samples",
+            Self::Doubt => "doubt",
+        }
+    }
+}
+
 /// What a criterion says about one tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
@@ -115,13 +147,8 @@ pub struct Verdict {
     pub threshold: Option<ExpectedThreshold>,
     /// Samples per pixel at which the criterion expects to be satisfied, if it can tell.
     pub expected_spp: Option<u64>,
-    /// Whether so few samples make up the noise of the tile that it is not known yet: nobody is satisfied
-    /// then, however undemanding. `converged` is false, and `expected_spp` where that changes at the latest,
-    /// or later.
-    pub doubted: bool,
-    /// Whether the tile is open only for light that it may not have met: of what one half of the samples alone has
-    /// met elsewhere, as much as is likely to be missing here would be seen.
-    pub unmet: bool,
+    /// What keeps the tile open, by the criterion; `None` if it has converged. See [`Session::open_for`](crate::Session::open_for).
+    pub open_for: Option<OpenFor>,
     /// Whether the tile is unlike everything the criterion was made for: treat the verdict with care.
     pub unfamiliar: bool,
     /// What `probability` would be without the penalty for an unfamiliar tile; equal to it where there is no
@@ -138,9 +165,10 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// A verdict of a criterion that expects nothing and computes no probability.
+    /// A verdict of a criterion that expects nothing and computes no probability: open for noise, or converged.
     pub fn new(converged: bool) -> Self {
-        Self { converged, ..Self::default() }
+        let open_for = if converged { None } else { Some(OpenFor::Noise) };
+        Self { converged, open_for, ..Self::default() }
     }
 
     /// The same with [`Verdict::expected_spp`].
@@ -153,9 +181,9 @@ impl Verdict {
         Self { brightness_differs, ..self }
     }
 
-    /// The same, but open for light that the tile may not have met: [`Verdict::unmet`].
-    pub fn lacking_light(self) -> Self {
-        Self { converged: false, unmet: true, ..self }
+    /// The same, but open for this.
+    pub fn kept_open_by(self, why: OpenFor) -> Self {
+        Self { converged: false, open_for: Some(why), ..self }
     }
 
     /// The same with [`Verdict::lost`] and [`Verdict::undenoised`].
@@ -287,6 +315,8 @@ pub enum CriterionError {
 /// - Return one verdict for each tile, in order, with probabilities from 0 to 1. Fewer, more or others are
 ///   [`CriterionError::Contract`], and no tile stops by them.
 /// - Verdicts must not depend on the number of threads.
+/// - The exposure may still move while [`View::exposure_error`] is large; what it moves by reopens tiles. Count the error,
+///   or wait for it to fall.
 /// - Declare in [`StoppingCriterion::needs`] what you read; what nobody needs is neither rendered nor kept.
 /// - Forget the previous film in [`StoppingCriterion::begin`]; a criterion without state has nothing to do
 ///   there.
@@ -412,10 +442,9 @@ impl StoppingCriterion for FixedSpp {
     }
 
     fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        let verdict = |t: &Tile| Verdict {
-            converged: view.film.spp(t.index) >= self.0,
-            expected_spp: Some(self.0),
-            ..Verdict::default()
+        let verdict = |t: &Tile| match Verdict::new(view.film.spp(t.index) >= self.0) {
+            enough if enough.converged => enough.expecting(Some(self.0)),
+            few => few.kept_open_by(OpenFor::FewSamples).expecting(Some(self.0)),
         };
         Ok(tiles.iter().map(verdict).collect())
     }

@@ -134,16 +134,15 @@ impl TilePlanes {
         shown.into_planes(tile)
     }
 
-    /// Share of the pixels of the tile that carry its noise: (Σr²)² / (N·Σr⁴) of the residuals r, the inverse of
-    /// their kurtosis. A third if they are normal and equally strong everywhere, 1/N if one pixel has all of it,
-    /// 0 without noise. An energy of noise that is estimated from one residual for each pixel has a relative
-    /// variance of about 1/(share·N).
-    pub(crate) fn noise_spread(&self) -> f32 {
+    /// How many pixels of the tile carry its noise: (Σr²)²/Σr⁴ of the residuals r. A third of them if they are normal and
+    /// equally strong everywhere, 1 if one pixel has all of it, 0 without noise. An energy of noise that is estimated from
+    /// one residual for each pixel has a relative variance of about the inverse.
+    pub(crate) fn noise_carriers(&self) -> f64 {
         let [squares, fourths] = match &self.colour {
             None => self.residual.sums_inside(self.inner, |r| [r * r, (r * r) * (r * r)]),
             Some(colour) => colour.energy().sums_inside(self.inner, |square| [square, square * square]),
         };
-        if fourths > 0.0 { (squares * squares / (fourths * self.inner.pixels() as f64)) as f32 } else { 0.0 }
+        if fourths > 0.0 { squares * squares / fourths } else { 0.0 }
     }
 
     /// Returns its memory to this thread's buffers, so that the next verdict does not allocate.

@@ -40,7 +40,7 @@
 //!     }
 //!     session.judge()?;
 //! }
-//! // Where no sample has shown noise yet, the oracle waits for 100 samples: the first verdict from there on
+//! // Few pixels of few samples may not have met all light yet: the first verdict from 100 samples on is sure of it
 //! assert!(session.stops().all(|stop| stop.reason == StopReason::Converged && stop.spp == 104));
 //! # Ok::<(), noisefloor::SessionError>(())
 //! ```

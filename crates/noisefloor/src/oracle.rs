@@ -2,11 +2,12 @@
 
 #[cfg(feature = "files")]
 use crate::container;
-use crate::criterion::{CriterionError, ExpectedThreshold, Needs, StoppingCriterion, Verdict, View};
+use crate::criterion::{CriterionError, ExpectedThreshold, Needs, OpenFor, StoppingCriterion, Verdict, View};
 use crate::descriptor::{Described, DescriptorError};
 use crate::evidence::{Evidence, Shown, TilePlanes};
 use crate::model::{Model, ProbabilityCurve};
 use crate::params::Audience;
+use crate::people::Unknown;
 use crate::tile::{Tile, TileGrid};
 use crate::unmet::{MetOnce, Unmet};
 use noisefloor_vision::Viewing;
@@ -22,20 +23,6 @@ pub use crate::people::{People, PeopleError};
 /// converged.
 const NO_EVIDENCE: usize = 16;
 
-/// Samples per pixel from which noise is trusted however it is distributed, and whatever the size of the picture.
-const TRUSTED_SPP: u64 = 100;
-
-/// Samples of a picture from which it is trusted sooner: in fewer, light that makes up a tenth of a picture is
-/// too often met by none. Pictures from 362×362 pixels on have them at the first verdict
-/// (docs/benchmarks/stops.md).
-const TRUSTED_SAMPLES: u64 = 1 << 21;
-
-/// Share of the pixels of a tile that have to carry its noise for it to be trusted sooner.
-const EVEN: f32 = 1.0 / 32.0;
-
-/// How many pixels that has to be at least: the energy of their noise is then known to about a sixth.
-const CARRIERS: f64 = 32.0;
-
 /// How many tiles beside each other are shown together, at most: more would leave threads without work.
 const SHOWN_TOGETHER: usize = 4;
 
@@ -44,13 +31,11 @@ const MORE: f64 = 1.25;
 
 /// Judges tiles by a trained model.
 ///
-/// In a session, a tile with fewer than 100 samples per pixel is not called converged unless its noise is spread
-/// over many pixels, and the picture has two million samples: noise that a few samples have made is not known
-/// yet, and neither is light that no sample has found.
-///
-/// What only one half of the samples has met around a tile, or in its picture, tells how much light the tile is
-/// likely to lack. While that would be seen, it is not called converged ([`Verdict::unmet`]); where it is found
-/// later, the verdict is taken back ([`StoppingCriterion::revised`]).
+/// What is not known yet is part of P: the exposure by its standard error, noise by how few pixels carry it, texture that the
+/// model was not tried on. And a tile has converged only if P is large enough with the light that it is likely to
+/// lack: by what only one half of the samples has met around it, or in its picture, and by what none may have met.
+/// [`Verdict::open_for`] says which of these decides. Where more such light is found later, the verdict is taken back
+/// ([`StoppingCriterion::revised`]).
 #[derive(Clone, Debug)]
 pub struct Oracle {
     model: Model,
@@ -68,8 +53,8 @@ pub struct Oracle {
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 struct LastDescribed {
     tile: Described,
-    /// Share of its pixels that carry its noise.
-    spread: f32,
+    /// How many of its pixels carry its noise.
+    carriers: f64,
     /// What only one half has met in it.
     met_once: MetOnce,
     /// Mean radiance that it may have lacked, and nobody would have seen; `None` while it is not done.
@@ -129,7 +114,7 @@ impl Oracle {
         if !self.model.parts().descriptor.project(&mut raw, (from / spp) as f32) {
             return None;
         }
-        let trained = self.verdict(&raw, from.round().max(1.0) as u64);
+        let trained = self.verdict(&raw, from.round().max(1.0) as u64, Unknown::default());
         let satisfied = seen_as > 0.0;
         let converged = satisfied && trained.converged;
         let expected_spp = if converged {
@@ -140,24 +125,33 @@ impl Oracle {
         let seen = |p: Option<f32>| if satisfied { p } else { Some(0.0) };
         Some(Verdict {
             converged,
+            open_for: if satisfied { trained.open_for } else { Some(OpenFor::Noise) },
             probability: seen(trained.probability),
             threshold: trained.threshold.map(|threshold| threshold.map(|spp| audience.samples(spp))),
             expected_spp,
-            doubted: trained.doubted,
-            unmet: trained.unmet,
             unfamiliar: trained.unfamiliar,
             probability_without_penalty: seen(trained.probability_without_penalty),
             ..Verdict::default()
         })
     }
 
-    /// A verdict by a whole, raw descriptor.
-    fn verdict(&self, raw: &[f32], spp: u64) -> Verdict {
-        let mut curve = self.model.parts().curve(raw, self.scatter);
+    /// A verdict by a whole, raw descriptor, and by what is not known beside it.
+    fn verdict(&self, raw: &[f32], spp: u64, unknown: Unknown) -> Verdict {
+        let mut curve = self.model.parts().curve(raw, self.scatter).within(unknown);
         let judgement = curve.judgement();
         let converged = self.people.are_satisfied_by(judgement.probability);
+        let without = |unknown| self.model.parts().curve(raw, self.scatter).within(unknown).judgement();
+        let open_for = match converged {
+            true => None,
+            false if !self.people.are_satisfied_by(without(Unknown::default()).probability) => {
+                Some(OpenFor::Noise)
+            }
+            false if unknown.exposure > unknown.noise => Some(OpenFor::Exposure),
+            false => Some(OpenFor::FewSamples),
+        };
         Verdict {
             converged,
+            open_for,
             probability: Some(judgement.probability),
             threshold: expected_threshold(&mut curve, spp),
             expected_spp: if converged {
@@ -271,10 +265,10 @@ impl Oracle {
     ) -> Result<Option<LastDescribed>, CriterionError> {
         let Some(planes) = self.planes(view, shown, tile)? else { return Ok(None) };
         let described = self.describe_tile(&planes, view.film.spp(tile.index) as f64);
-        let spread = planes.noise_spread();
+        let carriers = planes.noise_carriers();
         planes.recycle();
         let met_once = MetOnce::of(view.film, view.display, tile);
-        described.map(|tile| Some(LastDescribed { tile, spread, met_once, lacked: None }))
+        described.map(|tile| Some(LastDescribed { tile, carriers, met_once, lacked: None }))
     }
 
     /// Judges all tiles of a picture, without a memory, and says how visible noise is at each of its pixels; `None` if the model
@@ -300,57 +294,53 @@ impl Oracle {
         seen: &[Option<LastDescribed>],
         tiles: &[Tile],
     ) -> Result<Judged, CriterionError> {
-        let spread: Vec<f32> = seen.iter().map(|s| s.as_ref().map_or(0.0, |s| s.spread)).collect();
+        let unknown = |seen: &LastDescribed| Unknown::new(view.exposure_error, seen.carriers);
+        let unknown: Vec<Unknown> =
+            seen.iter().map(|seen| seen.as_ref().map(unknown).unwrap_or_default()).collect();
         let mut described: Vec<Option<Described>> =
             seen.iter().map(|s| s.as_ref().map(|s| s.tile.clone())).collect();
         let judge = |described: &[Option<Described>]| {
-            let verdicts = self.judge_noise(view, described, &spread, tiles);
+            let verdicts = self.judge_noise(view, described, &unknown, tiles);
             let enough =
                 |(tile, v): (&Tile, Verdict)| (v, self.is_enough(view, &v, view.film.spp(tile.index)));
             tiles.iter().zip(verdicts).map(enough).collect::<Vec<_>>()
         };
-        let unmet = Unmet::new(view.film.grid(), met_once(seen), view.viewing);
+        let unmet = Unmet::new(view.film, view.display, met_once(seen), view.viewing);
         let lit = |tile: Tile| {
-            let Some(shown) = unmet.shown(view.film, view.display, tile) else { return Ok(None) };
+            let Some(mut shown) = unmet.shown(view.film, view.display, tile) else { return Ok(None) };
+            // Who stands more noise, and so has enough with `slope` times the samples, does not stand more missing light
+            let slope = self.audience().then(view.audience).slope;
+            if slope < 1.0 {
+                let stronger = 1.0 / slope.max(1e-6).sqrt() as f32;
+                shown.residual.values_mut().iter_mut().for_each(|light| *light *= stronger);
+            }
             let Some(planes) = self.planes(view, None, tile)? else { return Ok(None) };
-            self.with_light(planes, shown, view.film.spp(tile.index) as f64).map(Some)
+            let lit = self.with_light(planes, shown, view.film.spp(tile.index) as f64)?;
+            Ok(Some((lit, unmet.kind(view.film, tile))))
         };
         let by_noise = judge(&described);
         let verdicts = judge_with_light(by_noise, &mut described, tiles, judge, lit)?;
         Ok(Judged { verdicts, described })
     }
 
-    /// Verdicts on these tiles by the noise of all; `spread` says how it is distributed in each.
+    /// Verdicts on these tiles by the noise of all, and by what is not known of each.
     fn judge_noise(
         &self,
         view: &View<'_>,
         described: &[Option<Described>],
-        spread: &[f32],
+        unknown: &[Unknown],
         tiles: &[Tile],
     ) -> Vec<Verdict> {
         let seen: Vec<Described> = described.iter().flatten().cloned().collect();
         let mut judged = self.model.parts().descriptor.in_picture(&seen).into_iter();
         let numbers: Vec<Option<Vec<f32>>> =
             described.iter().map(|d| d.as_ref().and_then(|_| judged.next())).collect();
-        let (width, height) = view.film.grid().size();
-        let of_picture = TRUSTED_SAMPLES.div_ceil((width * height) as u64).min(TRUSTED_SPP);
         let judge = |tile: &Tile| match &numbers[tile.index] {
-            Some(raw) => {
-                let (spp, spread) = (view.film.spp(tile.index), spread[tile.index]);
-                let verdict = self.verdict(raw, spp);
-                let even = spread >= EVEN && f64::from(spread) * tile.pixels() as f64 >= CARRIERS;
-                let trusted = if even { of_picture } else { TRUSTED_SPP };
-                if spp < trusted {
-                    let expected_spp = verdict.expected_spp.map(|need| need.max(trusted));
-                    Verdict { converged: false, expected_spp, doubted: true, ..verdict }
-                } else {
-                    verdict
-                }
-            }
+            Some(raw) => self.verdict(raw, view.film.spp(tile.index), unknown[tile.index]),
             None => Verdict {
                 probability: Some(0.0),
                 probability_without_penalty: Some(0.0),
-                ..Verdict::default()
+                ..Verdict::new(false).kept_open_by(OpenFor::FewSamples)
             },
         };
         tiles.par_iter().map(judge).collect()
@@ -360,9 +350,9 @@ impl Oracle {
     /// their need is expected to be met.
     fn is_enough(&self, view: &View<'_>, verdict: &Verdict, spp: u64) -> bool {
         let audience = self.audience().then(view.audience);
-        let sooner = audience.slope < 1.0 && !verdict.doubted;
         verdict.converged
-            || (sooner && verdict.expected_spp.is_some_and(|need| audience.samples(need) <= spp))
+            || (audience.slope < 1.0
+                && verdict.expected_spp.is_some_and(|need| audience.samples(need) <= spp))
     }
 
     /// A tile as it would be with the light that it is likely to lack.
@@ -397,7 +387,7 @@ impl Oracle {
         &self,
         described: Vec<Described>,
         audience: Audience,
-        light: impl Fn(Tile) -> Result<Option<[TilePlanes; 2]>, E> + Sync,
+        light: impl Fn(Tile) -> Result<Option<([TilePlanes; 2], OpenFor)>, E> + Sync,
     ) -> Result<Option<Judged>, E> {
         let Some(by_noise) = self.judge_finished_noise(&described, audience) else { return Ok(None) };
         let enough = |verdict: Verdict| (verdict, verdict.converged);
@@ -408,9 +398,9 @@ impl Oracle {
             let described: Vec<Described> = described.iter().flatten().cloned().collect();
             self.judge_finished_noise(&described, audience).into_iter().flatten().map(enough).collect()
         };
-        let lit = |tile: Tile| -> Result<Option<Described>, E> {
+        let lit = |tile: Tile| -> Result<Option<(Described, OpenFor)>, E> {
             match light(tile)? {
-                Some([planes, light]) => Ok(Some(self.with_light(planes, light, spp)?)),
+                Some(([planes, light], kind)) => Ok(Some((self.with_light(planes, light, spp)?, kind))),
                 None => Ok(None),
             }
         };
@@ -424,7 +414,7 @@ impl Oracle {
     fn judge_finished_noise(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
         let numbers = self.model.parts().descriptor.in_picture(tiles);
         let judge = |(tile, raw): (&Described, Vec<f32>)| match audience {
-            Audience::TRAINED => Some(self.verdict(&raw, tile.spp.round() as u64)),
+            Audience::TRAINED => Some(self.verdict(&raw, tile.spp.round() as u64, Unknown::default())),
             _ => self.verdict_for(raw, tile.spp, audience),
         };
         tiles.iter().zip(numbers).map(judge).collect()
@@ -433,7 +423,7 @@ impl Oracle {
     /// What stands before and after the share of people in the fingerprint.
     fn around_people(&self) -> [String; 2] {
         let scatter = self.scatter.map(|s| format!(", measured within {s}")).unwrap_or_default();
-        [format!("model {}, ", self.model.fingerprint()), format!(" of people{scatter}, unmet light 1")]
+        [format!("model {}, ", self.model.fingerprint()), format!(" of people{scatter}, unknown 1")]
     }
 
     fn misfit(&self, error: DescriptorError) -> CriterionError {
@@ -494,26 +484,28 @@ fn judge_with_light<E: Send>(
     described: &mut [Option<Described>],
     tiles: &[Tile],
     judge: impl FnOnce(&[Option<Described>]) -> Vec<(Verdict, bool)>,
-    lit: impl Fn(Tile) -> Result<Option<Described>, E> + Sync,
+    lit: impl Fn(Tile) -> Result<Option<(Described, OpenFor)>, E> + Sync,
 ) -> Result<Vec<(Verdict, bool)>, E> {
-    let found: Vec<Option<Described>> = (tiles, &by_noise)
+    let found: Vec<Option<(Described, OpenFor)>> = (tiles, &by_noise)
         .into_par_iter()
         .map(|(&tile, (_, enough))| if *enough { lit(tile) } else { Ok(None) })
         .collect::<Result<_, _>>()?;
     if found.iter().all(Option::is_none) {
         return Ok(by_noise);
     }
-    tiles
-        .iter()
-        .zip(found)
-        .filter(|(_, lit)| lit.is_some())
-        .for_each(|(tile, lit)| described[tile.index] = lit);
-    let with_light = judge(described);
-    let worse = |(noise, light): ((Verdict, bool), (Verdict, bool))| match (noise.1, light.1) {
-        (true, enough) => (Verdict { unmet: !enough, ..light.0 }, enough),
+    let kinds: Vec<Option<OpenFor>> = found.iter().map(|lit| lit.as_ref().map(|(_, kind)| *kind)).collect();
+    for (tile, lit) in tiles.iter().zip(found) {
+        described[tile.index] = lit.map(|(lit, _)| lit).or(described[tile.index].take());
+    }
+    // Of a tile whose noise is not seen, its own light decides, or that of its neighbours
+    let worse = |((noise, light), kind): (((Verdict, bool), (Verdict, bool)), Option<OpenFor>)| match (
+        noise.1, light.1,
+    ) {
+        (true, true) => light,
+        (true, false) => (light.0.kept_open_by(kind.unwrap_or(OpenFor::UnmetLight)), false),
         (false, _) => noise,
     };
-    Ok(by_noise.into_iter().zip(with_light).map(worse).collect())
+    Ok(by_noise.into_iter().zip(judge(described)).zip(kinds).map(worse).collect())
 }
 
 /// What each tile has met once.
@@ -527,12 +519,12 @@ fn expected_threshold(curve: &mut ProbabilityCurve<'_>, spp: u64) -> Option<Expe
     let mut reaches = |p: f32| {
         // Doublings of the samples, from a million times fewer to a million times more
         let (mut low, mut high) = (-20.0f32, 20.0f32);
-        if curve.without_penalty(high.exp2())? < p {
+        if curve.known(high.exp2())? < p {
             return None;
         }
         while high - low > 0.01 {
             let middle = 0.5 * (low + high);
-            if curve.without_penalty(middle.exp2())? >= p { high = middle } else { low = middle }
+            if curve.known(middle.exp2())? >= p { high = middle } else { low = middle }
         }
         Some((spp as f64 * f64::from(high).exp2()).ceil() as u64)
     };
@@ -612,7 +604,7 @@ impl StoppingCriterion for Oracle {
         }
 
         // Tiles that were called converged without what has been met elsewhere since are judged again
-        let unmet = Unmet::new(grid, met_once(&self.described), view.viewing);
+        let unmet = Unmet::new(view.film, view.display, met_once(&self.described), view.viewing);
         let grown = |tile: &Tile| {
             let lacked = self.described[tile.index].as_ref().and_then(|seen| seen.lacked);
             !due[tile.index] && lacked.is_some_and(|was| unmet.light(view.film, *tile) > MORE * was)
@@ -654,8 +646,9 @@ impl StoppingCriterion for Oracle {
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
         let Ok(described) = container::unpack::<Vec<Option<LastDescribed>>>(state) else { return false };
         let sound = |(tile, seen): (Tile, &Option<LastDescribed>)| {
-            let Some(LastDescribed { tile: d, spread, met_once, lacked }) = seen else { return true };
-            spread.is_finite()
+            let Some(LastDescribed { tile: d, carriers, met_once, lacked }) = seen else { return true };
+            carriers.is_finite()
+                && *carriers >= 0.0
                 && met_once.is_sound()
                 && lacked.is_none_or(|light| light.is_finite() && light >= 0.0)
                 && d.place == tile

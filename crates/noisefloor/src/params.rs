@@ -172,8 +172,7 @@ pub struct Params {
     pub viewing: Viewing,
     /// When tiles are judged.
     pub schedule: Schedule,
-    /// Fewest samples per pixel at which a tile may stop. A larger number finds more of the light that is seldom found. Below
-    /// 100, the oracle stops a tile only if its noise is spread over many pixels and the picture has two million samples.
+    /// Fewest samples per pixel at which a tile may stop. A larger number finds more of the light that is seldom found.
     pub min_spp: u64,
     /// Samples per pixel at which every tile stops (Takouachet et al. 2017, §4.2.1: 10,000).
     pub max_spp: u64,

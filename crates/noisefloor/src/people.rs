@@ -105,6 +105,34 @@ pub struct Spread {
     pub people: f64,
 }
 
+/// What is not known of a place, besides how scenes and people scatter: variances of the ln(samples) that it needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Unknown {
+    /// By the exposure of the picture.
+    pub(crate) exposure: f64,
+    /// By noise that few pixels carry.
+    pub(crate) noise: f64,
+    /// By texture that the model has not been tried on.
+    pub(crate) texture: f64,
+}
+
+impl Unknown {
+    /// Energy of noise grows with the square of the exposure at most: on a screen, in the dark; elsewhere with less.
+    const EXPOSURE_POWER: f64 = 2.0;
+
+    /// With this standard error of the exposure, and noise that so many pixels carry: its energy, one square for each of
+    /// them, has a relative variance of 1/`carriers`. Without noise, there is none to be mistaken about.
+    pub(crate) fn new(exposure_error: f64, carriers: f64) -> Self {
+        let noise = if carriers > 0.0 { (1.0 / carriers).ln_1p() } else { 0.0 };
+        Self { exposure: (Self::EXPOSURE_POWER * exposure_error).powi(2), noise, texture: 0.0 }
+    }
+
+    /// With `factor` times the samples: errors of means fall.
+    pub(crate) fn after(self, factor: f64) -> Self {
+        Self { exposure: self.exposure / factor, noise: self.noise / factor, ..self }
+    }
+}
+
 impl Spread {
     /// Of people in general: 0.5, within 0.4 to 0.7. By table 2 of Takouachet et al. 2017 (94.4 % see no noise at the
     /// stop, 8.2 % at 30 % of it) 0.36 for whole pictures and 0.40 to 0.55 for one zone; 0.79 for the 16 people of
@@ -130,9 +158,13 @@ impl Spread {
         self.scenes.hypot(self.people)
     }
 
-    /// Share of people who see no noise, where the mean observer of this share of scenes, as log-odds, sees none.
-    pub(crate) fn share(&self, log_odds: f64) -> f64 {
-        normal_cdf(self.margin(log_odds) / self.total())
+    /// Share of people who see no noise, where the mean observer of this share of scenes, as log-odds, sees none, over all that
+    /// is unknown. A log-normal energy lies above its median: of few carriers, more noise has gone unnoticed than noticed.
+    /// What is unknown satisfies nobody.
+    pub(crate) fn share(&self, log_odds: f64, Unknown { exposure, noise, texture }: Unknown) -> f64 {
+        let (margin, variance) = (self.margin(log_odds), exposure + noise + texture);
+        let known = normal_cdf(margin / self.total());
+        known.min(normal_cdf((margin - 0.5 * noise) / self.total().hypot(variance.sqrt())))
     }
 
     /// Share of people who see no noise *anywhere* in a picture, from the share of people for each of its places and
@@ -213,7 +245,11 @@ mod tests {
         for (scenes, needed) in [(1e-6, 2.0f64), (0.32, 2.35)] {
             let spread = Spread { scenes, people: 0.5 };
             let log_odds = needed.ln() / scenes * std::f64::consts::PI / 3f64.sqrt();
-            assert!((spread.share(log_odds) - 0.95).abs() < 0.002, "{scenes}: {}", spread.share(log_odds));
+            assert!(
+                (spread.share(log_odds, Unknown::default()) - 0.95).abs() < 0.002,
+                "{scenes}: {}",
+                spread.share(log_odds, Unknown::default())
+            );
         }
     }
 
@@ -255,7 +291,7 @@ mod tests {
             anywhere += u32::from(sees_none.iter().all(|&none| none));
         }
         let odds = |above: f64| above / spread.scenes * std::f64::consts::PI / 3f64.sqrt();
-        let shares = above.map(|above| spread.share(odds(above)));
+        let shares = above.map(|above| spread.share(odds(above), Unknown::default()));
         for (count, share) in in_place.into_iter().zip(shares) {
             assert!((f64::from(count) / f64::from(people) - share).abs() < 0.01, "{count} {share}");
         }

@@ -1,6 +1,6 @@
 //! The push loop: for a renderer that owns its main loop.
 
-use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View, check_verdicts};
+use crate::criterion::{CriterionError, OpenFor, StoppingCriterion, Verdict, View, check_verdicts};
 use crate::display::{BRIGHTEST, Display, Settled, ToneMapping};
 use crate::film::{Film, FilmError};
 use crate::params::{Audience, Params, ParamsError};
@@ -444,7 +444,7 @@ impl<C: StoppingCriterion> Session<C> {
     ///
     /// The first verdicts wait until every open tile has samples: the exposure is settled then, as that of
     /// the converged picture, unless the tone mapping has one or [`Session::set_display`] was called. It is
-    /// settled again as samples come. No tile converges before its standard error is below 1.5 %, and when
+    /// settled again as samples come. Criteria know its standard error ([`View::exposure_error`]), and when
     /// it moves by more than 2 %, all tiles are judged again: one that had converged can be open again, so
     /// that [`Session::requests`] has it, and is returned a second time when it is done.
     ///
@@ -489,7 +489,7 @@ impl<C: StoppingCriterion> Session<C> {
             let display = std::mem::replace(&mut self.display, before.0);
             let settling = std::mem::replace(&mut self.settling, before.1);
             let reference = self.displayed_reference.take();
-            let Some(view) = View::of(&self.film, &display, &self.params, &reference) else {
+            let Some(view) = view(&self.film, (&display, settling), &self.params, &reference) else {
                 return Ok(stops);
             };
             let asked: Vec<Tile> = again.iter().chain(&judged).copied().collect();
@@ -596,12 +596,11 @@ impl<C: StoppingCriterion> Session<C> {
     }
 
     /// Whether the criterion has what it wants, or a less demanding audience has enough where the others are
-    /// still expected to need more; and at an exposure that is known.
+    /// still expected to need more.
     fn is_satisfied(&self, verdict: &Verdict, samples: u64) -> bool {
         let content =
             self.audience().slope < 1.0 && self.expected(verdict).is_some_and(|need| need <= samples);
-        let known = self.criterion.only_counts() || self.settling.is_none_or(|settling| settling.is_known());
-        known && (verdict.converged || content)
+        verdict.converged || content
     }
 
     /// Files a verdict at another exposure on a tile that is not due: what is done stays done, or is open
@@ -632,7 +631,7 @@ impl<C: StoppingCriterion> Session<C> {
 
     /// Samples at which a tile is judged next that is not satisfied now.
     fn next_verdict(&self, samples: u64, expected: Option<u64>, open: f64) -> u64 {
-        // Where the exposure is not known yet, what the criterion expects may have come
+        // What light a tile lacks may fall faster than the criterion expects
         let ahead = expected.filter(|&need| need > samples);
         self.params.schedule.next(samples, ahead, open).min(self.params.max_spp)
     }
@@ -662,12 +661,10 @@ impl<C: StoppingCriterion> Session<C> {
         (samples >= max_spp).then(|| self.stop(index, StopReason::MaxSpp))
     }
 
-    /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience
-    /// sooner, but not where the noise itself is not known yet.
+    /// Where a verdict like this expects the next ones to say "converged": for a less demanding audience sooner.
     fn expected(&self, verdict: &Verdict) -> Option<u64> {
         let audience = self.audience();
-        let sooner = audience.slope < 1.0 && !verdict.doubted;
-        verdict.expected_spp.map(|need| if sooner { audience.samples(need) } else { need })
+        verdict.expected_spp.map(|need| if audience.slope < 1.0 { audience.samples(need) } else { need })
     }
 
     /// The line from the thresholds of the training data to those wanted.
@@ -737,11 +734,28 @@ impl<C: StoppingCriterion> Session<C> {
         self.tiles[tile].verdict
     }
 
+    /// What keeps a tile from being done, or has kept it until a limit; `None` if nothing does. A tile that no criterion has
+    /// judged is open for [`OpenFor::FewSamples`]; what the session itself waits for is [`OpenFor::Doubt`].
+    ///
+    /// # Panics
+    /// If the tile does not exist.
+    pub fn open_for(&self, tile: usize) -> Option<OpenFor> {
+        let TileState { stop, verdict, .. } = self.tiles[tile];
+        match (stop, verdict) {
+            (Some(stop), _) if stop.reason.is_satisfied() => None,
+            _ if self.watch.doubts() && !self.criterion.only_counts() => Some(OpenFor::Doubt),
+            (_, None) => Some(OpenFor::FewSamples),
+            // More verdicts in a row are asked for, or more for this audience
+            (_, Some(verdict)) => Some(verdict.open_for.unwrap_or(OpenFor::Noise)),
+        }
+    }
+
     /// How visible the noise is at each pixel of the image, row-major, as a multiple of what is just seen
     /// ([`StoppingCriterion::visible_noise`]); NaN where there is no evidence. Computed at each call. `None`
     /// before the display is settled, or if the criterion cannot say.
     pub fn visible_noise(&self) -> Option<Vec<f32>> {
-        let view = View::of(&self.film, &self.display, &self.params, &self.displayed_reference)?;
+        let display = (&self.display, self.settling);
+        let view = view(&self.film, display, &self.params, &self.displayed_reference)?;
         self.criterion.visible_noise(&view)
     }
 
@@ -778,6 +792,18 @@ impl<C: StoppingCriterion> Session<C> {
     pub fn into_film(self) -> (Film, Option<Display>) {
         (self.film, self.display)
     }
+}
+
+/// What a criterion looks at; none before the display is settled.
+fn view<'a>(
+    film: &'a Film,
+    (display, settling): (&'a Option<Display>, Option<Settling>),
+    params: &Params,
+    reference: &'a Option<Vec<Rgb>>,
+) -> Option<View<'a>> {
+    let view = View::new(film, display.as_ref()?).seen_on(params.viewing);
+    let exposure_error = settling.map_or(0.0, |settling| settling.error);
+    Some(View { audience: params.audience, reference: reference.as_deref(), exposure_error, ..view })
 }
 
 #[cfg(feature = "files")]

@@ -1,6 +1,6 @@
 //! Pictures rendered elsewhere: compared, described and judged.
 
-use crate::criterion::{CriterionError, Verdict};
+use crate::criterion::{CriterionError, OpenFor, Verdict};
 use crate::descriptor::Described;
 use crate::display::exposure::{self, NoisyPixel};
 use crate::display::{Display, ToneMapping, luminance};
@@ -395,7 +395,7 @@ impl<'a> SnapshotPair<'a> {
     /// the pictures.
     ///
     /// Where the pictures are linear, what only one of them has met tells how much light both are likely to lack; a tile where
-    /// that would be seen is not converged ([`Verdict::unmet`]).
+    /// that would be seen is not converged ([`Verdict::open_for`]).
     ///
     /// # Errors
     /// [`StillError`] if there is nothing to judge by, the model is for tiles of another size, or it cannot tell what this
@@ -409,9 +409,10 @@ impl<'a> SnapshotPair<'a> {
         let described = self.describe_tiles(oracle, grid)?;
         let film = self.film(grid);
         let unmet = film.as_ref().map(|film| (film, Unmet::of(film, &self.display, self.viewing)));
-        let light = |tile: Tile| -> Result<Option<[TilePlanes; 2]>, StillError> {
-            let shown = unmet.as_ref().and_then(|(film, unmet)| unmet.shown(film, &self.display, tile));
-            shown.map(|shown| Ok([self.planes_of(tile)?, shown])).transpose()
+        let light = |tile: Tile| -> Result<Option<([TilePlanes; 2], OpenFor)>, StillError> {
+            let Some((film, unmet)) = &unmet else { return Ok(None) };
+            let Some(shown) = unmet.shown(film, &self.display, tile) else { return Ok(None) };
+            Ok(Some(([self.planes_of(tile)?, shown], unmet.kind(film, tile))))
         };
         let judged = oracle.judge_finished(described, audience, light)?;
         let Judged { verdicts, described } = judged.ok_or(StillError::Audience)?;

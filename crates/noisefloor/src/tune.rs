@@ -20,7 +20,7 @@ mod search;
 
 pub use search::{Look, Search, drive};
 
-use crate::criterion::{CriterionError, Verdict, View};
+use crate::criterion::{CriterionError, OpenFor, Verdict, View};
 use crate::display::Display;
 use crate::film::{Film, blend_row};
 use crate::oracle::Oracle;
@@ -419,7 +419,7 @@ impl PicturePair {
         let (compared, film) = self.compare(params)?;
         let warnings = compared.notice(film.grid())?.warnings;
         let (display, viewing) = (compared.display(), params.viewing);
-        let view = View { film: &film, display, viewing, audience: params.audience, reference: None };
+        let view = View { audience: params.audience, ..View::new(&film, display).seen_on(viewing) };
         let (verdicts, map) = oracle.judge_all(&view)?;
         let map = map.ok_or(PairError::NoMap)?;
 
@@ -427,8 +427,8 @@ impl PicturePair {
         let ratio = worst.map_or(0.0, |worst| f64::from(map[worst]));
         // Noise falls as the root of the samples
         let wanted = |verdict: &Verdict| verdict.expected_spp.map_or(f64::INFINITY, |spp| spp as f64);
-        let doubted = verdicts.iter().filter(|verdict| verdict.doubted).map(wanted).fold(0.0, f64::max);
-        let ratio = ratio.max((doubted / film.spp(0) as f64).sqrt());
+        let few = verdicts.iter().filter(|verdict| verdict.open_for == Some(OpenFor::FewSamples));
+        let ratio = ratio.max((few.map(wanted).fold(0.0, f64::max) / film.spp(0) as f64).sqrt());
         let place = worst.map(|worst| (worst % self.size().0, worst / self.size().0));
         let squares = most_in_squares(self.size(), &map);
         let excess = self.known(Excess { place, ..Excess::new(ratio) }, &squares, counts);

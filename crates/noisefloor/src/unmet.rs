@@ -15,9 +15,13 @@
 //! counts, a gamma distribution): where finds are many, a place that has none lacks one at the most, and a
 //! single one may lie anywhere.
 //!
+//! Where nothing was met once, nothing tells of what was missed. As much as [`NOTHING_MET`] is expected all the same, spread
+//! over all samples of the picture; a tile that has met light of that order needs none.
+//!
 //! Whether so much light would be seen if it fell on a tile is for the criterion to say: [`Unmet::shown`]
 //! draws it.
 
+use crate::criterion::OpenFor;
 use crate::display::{Display, luminance};
 use crate::evidence::TilePlanes;
 use crate::film::Film;
@@ -34,8 +38,16 @@ use std::f64::consts::TAU;
 const PLACE: f64 = 0.75;
 /// What is shown is brightest in the middle of a place, by this factor.
 const PEAK: f64 = 4.0;
-/// Less on the screen than this is no light: half a step of eight bits.
-const NOTHING: f32 = 0.5 / 255.0;
+/// Less on the screen than this is not shown: half a step of eight bits.
+const UNSEEN: f32 = 0.5 / 255.0;
+
+/// Light that nothing has met yet, in average greys of one sample, over all samples of a picture: one find of light that makes
+/// up a tenth of a picture, and that one sample in 250,000 meets. Half of it lets `caustic` end without its caustic in one of 20
+/// seeds, and takes half as many samples in small pictures (docs/benchmarks/stops.md).
+const NOTHING_MET: f64 = 0.1 * 250_000.0;
+
+/// Samples per pixel from which a tile is not expected to lack what nothing has met: pictures of few pixels would never end.
+const ENOUGH_SPP: u64 = 100;
 
 /// Exposed radiance of an average grey.
 const GREY: f32 = 0.18;
@@ -56,6 +68,8 @@ pub(crate) struct MetOnce {
     /// The same, each times that of the sample that has it all.
     by_sample: f64,
     pixels: f64,
+    /// Luminance of all that was met, in the mean of all samples, summed over pixels.
+    all: f64,
 }
 
 impl MetOnce {
@@ -81,6 +95,9 @@ impl MetOnce {
             }
             let [a, b] = &halves;
             let own = [a.here(), b.here()];
+            for (rows, share) in own.iter().zip(of_tile.shares) {
+                met.all += share * rows.iter().map(|&light| f64::from(light)).sum::<f64>();
+            }
             let around = [&a.highest[..], &b.highest];
             if film.rejected() == 0 {
                 let mut found = [0.0; AT_ONCE];
@@ -114,6 +131,7 @@ impl MetOnce {
             light: self.light + other.light,
             by_sample: self.by_sample + other.by_sample,
             pixels: self.pixels + other.pixels,
+            all: self.all + other.all,
         }
     }
 
@@ -136,8 +154,8 @@ impl MetOnce {
 
     #[cfg(feature = "files")]
     pub(crate) fn is_sound(self) -> bool {
-        let Self { light, by_sample, pixels } = self;
-        [light, by_sample, pixels].into_iter().all(|v| v.is_finite() && v >= 0.0)
+        let Self { light, by_sample, pixels, all } = self;
+        [light, by_sample, pixels, all].into_iter().all(|v| v.is_finite() && v >= 0.0)
     }
 }
 
@@ -256,6 +274,10 @@ pub struct Unmet {
     grid: TileGrid,
     tiles: Vec<Option<MetOnce>>,
     picture: MetOnce,
+    /// Light for each pixel that none of the samples may have met.
+    nothing: f64,
+    /// Radiance of an average grey.
+    grey: f64,
     /// Edge of a place in pixels.
     place: f64,
 }
@@ -266,19 +288,42 @@ impl Unmet {
         let grid = film.grid();
         let tiles: Vec<Tile> = grid.tiles().collect();
         let met = tiles.par_iter().map(|&tile| Some(MetOnce::of(film, display, tile))).collect();
-        Self::new(grid, met, viewing)
+        Self::new(film, display, met, viewing)
     }
 
     /// `tiles` has what each tile of the grid has met once; `None` for one without evidence.
-    pub(crate) fn new(grid: TileGrid, tiles: Vec<Option<MetOnce>>, viewing: Viewing) -> Self {
+    pub(crate) fn new(film: &Film, display: &Display, tiles: Vec<Option<MetOnce>>, viewing: Viewing) -> Self {
+        let grid = film.grid();
+        let grey = f64::from(GREY / display.exposure());
+        let nothing = NOTHING_MET * grey / film.total_samples().max(1) as f64;
         let picture = tiles.iter().flatten().fold(MetOnce::default(), |sum, &tile| sum.and(tile));
         let place = (PLACE * viewing.pixels_per_degree()).max(1.0);
-        Self { grid, tiles, picture, place }
+        Self { grid, tiles, picture, nothing, grey, place }
     }
 
-    /// Mean radiance that a tile is likely to lack: by the tiles around it or by the whole
-    /// picture, whichever says more.
+    /// Mean radiance that a tile is likely to lack: by the tiles around it, by the whole picture, or by what nothing has met,
+    /// whichever says more.
     pub fn light(&self, film: &Film, tile: Tile) -> f64 {
+        self.met_elsewhere(film, tile).max(self.nothing_met(film, tile))
+    }
+
+    /// What the light is that a tile is likely to lack.
+    pub fn kind(&self, film: &Film, tile: Tile) -> OpenFor {
+        let met = self.met_elsewhere(film, tile) >= self.nothing_met(film, tile);
+        if met { OpenFor::UnmetLight } else { OpenFor::FewSamples }
+    }
+
+    /// Surfaces are as bright by what was met as they would be by other light: what is darker than grey shows less of it, and
+    /// empty space none.
+    fn nothing_met(&self, film: &Film, tile: Tile) -> f64 {
+        let Some(own) = self.tiles[tile.index].filter(|_| film.spp(tile.index) < ENOUGH_SPP) else {
+            return 0.0;
+        };
+        let brightness = (own.all / own.pixels.max(1.0) / self.grey).min(1.0);
+        (self.nothing * brightness - own.density()).max(0.0)
+    }
+
+    fn met_elsewhere(&self, film: &Film, tile: Tile) -> f64 {
         let Some(own) = self.tiles[tile.index] else { return 0.0 };
         let (columns, rows) = (self.grid.columns(), self.grid.rows());
         let (column, row) = (tile.index % columns, tile.index / columns);
@@ -298,7 +343,7 @@ impl Unmet {
         let most = (PEAK * light) as f32;
         let step = |on: f32| display.luma([on + most; 3]) - display.luma([on; 3]);
         // Screens show more of it on black or on grey than on anything brighter
-        if step(0.0).max(step(GREY / display.exposure())) < NOTHING {
+        if step(0.0).max(step(GREY / display.exposure())) < UNSEEN {
             return None;
         }
         let width = self.grid.width();

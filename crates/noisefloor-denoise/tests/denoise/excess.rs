@@ -2,7 +2,9 @@
 
 use crate::kit::{SIZE, Simple, noisy};
 use noisefloor::tune::PicturePair;
-use noisefloor::{Film, Params, Rgb, Schedule, Session, Tile, Viewing, display::Display, tile::TileGrid};
+use noisefloor::{
+    Film, Params, Rgb, Schedule, Session, Tile, Viewing, criterion::OpenFor, display::Display, tile::TileGrid,
+};
 use noisefloor_denoise::{DenoisedError, DenoisedQuality, jods_lost_unmet};
 
 const SPP: u64 = 10;
@@ -44,8 +46,9 @@ fn two_pictures_lack_what_a_session_of_their_halves_says() {
             }
         }
         session.judge().unwrap();
-        let unmet: Vec<usize> =
-            (0..6).filter(|&tile| session.verdict(tile).is_some_and(|verdict| verdict.unmet)).collect();
+        let lacks =
+            |tile: &usize| matches!(session.open_for(*tile), Some(OpenFor::UnmetLight | OpenFor::FewSamples));
+        let unmet: Vec<usize> = (0..6).filter(lacks).collect();
         let found = lacking(&halves);
         assert_eq!(found, unmet, "{light}");
         assert_eq!(!unmet.is_empty(), held, "{light}");

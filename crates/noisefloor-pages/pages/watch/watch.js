@@ -53,6 +53,14 @@ function time(seconds) {
   return minutes > 0 ? `${minutes} min ${whole % 60} s` : `${whole} s`;
 }
 
+// Colours of tiles that are open for something else than their noise, which is white.
+const WAITS_FOR = {
+  exposure: "rgb(90 170 255 / 0.9)",
+  "unmet-light": "rgb(255 210 40 / 0.9)",
+  "few-samples": "rgb(120 230 120 / 0.9)",
+  doubt: "rgb(255 90 90 / 0.9)",
+};
+
 // The map has the shape of the picture, at most as many pixels as the screen has.
 function draw() {
   if (state === null || state.width === 0) return;
@@ -69,7 +77,7 @@ function draw() {
       context.lineWidth = 2;
       context.strokeStyle = "rgb(0 0 0 / 0.7)";
       context.strokeRect(x + 2, y + 2, width - 4, height - 4);
-      context.strokeStyle = "rgb(255 255 255 / 0.9)";
+      context.strokeStyle = WAITS_FOR[tile.open_for] ?? "rgb(255 255 255 / 0.9)";
       context.strokeRect(x + 1, y + 1, width - 2, height - 2);
       continue;
     }
@@ -91,7 +99,7 @@ function point(event) {
   const tile = state.tiles.find((t) => x >= t.x && y >= t.y && x < t.x + t.width && y < t.y + t.height);
   if (tile === undefined) return;
   const p = tile.probability === null ? "not judged yet" : `P(no noise is seen) = ${tile.probability.toFixed(2)}`;
-  byId("tile").textContent = `Tile at ${tile.x}, ${tile.y}: ${tile.spp} samples per pixel, ${p}, ${tile.open ? "open" : "done"}`;
+  byId("tile").textContent = `Tile at ${tile.x}, ${tile.y}: ${tile.spp} samples per pixel, ${p}, ${tile.open ? `open for ${tile.open_for}` : "done"}`;
 }
 
 byId("stage").addEventListener("pointermove", point);

@@ -49,6 +49,8 @@ const LEAST_DEVIATION: f64 = 0.3;
 const UNIT: f64 = 3.75;
 /// Edge of the zones that people judged, in windows: 200 pixels of LISIC's pictures, at 28 a window.
 const ZONE: usize = 7;
+/// Largest share of a picture that a place takes up whose noise is not the picture's: 19 of 20 places have not met its dot.
+const LOCAL: f64 = 0.05;
 /// Least amplitude of noise that is told from none, in that unit.
 const NOISE_FLOOR: f64 = 0.03;
 /// Least light that is told from black, as a share of white.
@@ -236,19 +238,27 @@ impl Visible {
     /// samples and the picture would have with as many.
     ///
     /// The quantile is over parts of the picture as large as the zones that people judged, each by its worst window:
-    /// over tiles, it would hang on their size. Where tiles are apart from each other, they are such zones.
+    /// over tiles, it would hang on their size. Where tiles are apart from each other, they are such zones. Of few zones, one dot
+    /// would be the noise of most: there, the worst place is left out, if the others make up 19 of 20.
     fn with_picture(self, contrast: &PictureContrast, tiles: &[Described], noises: &[f32]) -> Vec<Vec<f32>> {
         let area: f64 = tiles.iter().map(|t| t.place.pixels() as f64).sum();
         let light = tiles.iter().map(|t| t.place.pixels() as f64 * f64::from(t.own[2])).sum::<f64>() / area;
         let of_one_sample =
             |(t, &noise): (&Described, &f32)| (amplitude(noise) * t.spp.sqrt(), t.place.pixels() as f64);
         let window = tiles.iter().find(|t| !t.blocks.is_empty()).map(|t| t.window);
+        let strength = |here: WindowContrast| here.amplitude(1.0, self.crest) / UNIT;
         let mut all: Vec<(f64, f64)> = match window {
             None => tiles.iter().zip(noises).map(of_one_sample).collect(),
             Some(window) => {
-                let zones = contrast.zones(ZONE * window, window);
-                let amplitude = |worst: WindowContrast| worst.amplitude(1.0, self.crest) / UNIT;
-                zones.into_iter().map(|(worst, blocks)| (amplitude(worst), blocks as f64)).collect()
+                let zones = contrast.zones(ZONE * window, window, None);
+                // The quantile leaves out one zone of many by itself
+                let few = (zones.len() as f64) * (1.0 - self.picture_quantile) < 1.0;
+                let place = few.then(|| contrast.worst_place(LOCAL, window, strength)).flatten();
+                let zones = match &place {
+                    Some(place) => contrast.zones(ZONE * window, window, Some(place)),
+                    None => zones,
+                };
+                zones.into_iter().map(|(worst, blocks)| (strength(worst), blocks as f64)).collect()
             }
         };
         all.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -160,9 +160,38 @@ impl PictureContrast {
         columns.map(around).fold(WindowContrast::default(), WindowContrast::or)
     }
 
+    /// Blocks whose windows overlap with the worst window of the picture, as rows and columns; `None` if these make up more than
+    /// a share of it.
+    pub(super) fn worst_place(
+        &self,
+        share: f64,
+        window: usize,
+        amplitude: impl Fn(WindowContrast) -> f64 + Sync,
+    ) -> Option<(Range<usize>, Range<usize>)> {
+        let of_row = |row: usize| {
+            let around = |column: usize| amplitude(self.worst_in_row(row, column..column + 1, window));
+            let worst = self.columns.clone().map(|column| (around(column), column));
+            worst.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(most, column)| (most, row, column))
+        };
+        let of_rows: Vec<_> =
+            self.rows.clone().into_par_iter().with_min_len(ROWS_AT_ONCE).map(of_row).collect();
+        let (_, row, column) = of_rows.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let around = |at: usize, all: &Range<usize>| {
+            (at + 1).saturating_sub(window).max(all.start)..(at + window).min(all.end)
+        };
+        let (rows, columns) = (around(row, &self.rows), around(column, &self.columns));
+        let blocks = (self.rows.len() * self.columns.len()) as f64;
+        ((rows.len() * columns.len()) as f64 <= share * blocks).then_some((rows, columns))
+    }
+
     /// The worst window around a block of each of the zones that the picture divides into, with as many blocks as it has:
-    /// of equal size, near `edge` blocks.
-    pub(super) fn zones(&self, edge: usize, window: usize) -> Vec<(WindowContrast, usize)> {
+    /// of equal size, near `edge` blocks. Blocks of `without`, as rows and columns, do not count.
+    pub(super) fn zones(
+        &self,
+        edge: usize,
+        window: usize,
+        without: Option<&(Range<usize>, Range<usize>)>,
+    ) -> Vec<(WindowContrast, usize)> {
         let divide = |all: &Range<usize>| {
             let count = ((all.len() as f64 / edge as f64).round() as usize).max(1);
             let (start, length) = (all.start, all.len());
@@ -170,7 +199,15 @@ impl PictureContrast {
         };
         let zone = |(rows, columns): (Range<usize>, Range<usize>)| {
             let blocks = rows.len() * columns.len();
-            (self.worst((rows, columns), window), blocks)
+            let of_row = |row: usize| match without {
+                Some((rows, place)) if rows.contains(&row) => {
+                    let before = columns.start..columns.end.min(place.start);
+                    let after = columns.start.max(place.end)..columns.end;
+                    self.worst_in_row(row, before, window).or(self.worst_in_row(row, after, window))
+                }
+                _ => self.worst_in_row(row, columns.clone(), window),
+            };
+            (rows.map(of_row).fold(WindowContrast::default(), WindowContrast::or), blocks)
         };
         let (rows, columns) = (&self.rows, &self.columns);
         let zones = divide(rows).flat_map(|rows| divide(columns).map(move |columns| (rows.clone(), columns)));
@@ -272,13 +309,32 @@ mod tests {
         let noisy =
             |x: usize, y: usize| if (20..24).contains(&x) && (20..24).contains(&y) { 3.0 } else { 0.0 };
         let picture = PictureContrast::new(&divided((200, 100), 40, noisy));
-        let zones = picture.zones(24, 1);
+        let zones = picture.zones(24, 1, None);
         assert_eq!(zones.iter().map(|zone| zone.1).collect::<Vec<_>>(), [625, 625]);
         assert!(
             (zones[0].0.square - 3.0).abs() < 1e-6 && zones[1].0 == WindowContrast::default(),
             "{zones:?}"
         );
-        assert_eq!(picture.zones(1000, 1).len(), 1);
+        assert_eq!(picture.zones(1000, 1, None).len(), 1);
+    }
+
+    /// The worst place is left out with all windows that overlap with it, if it is small enough.
+    #[test]
+    fn a_picture_without_its_worst_place_has_what_is_left() {
+        let noisy = |x: usize, y: usize| match (x / 4, y / 4) {
+            (20, 10) => 9.0,
+            (40, 10) => 2.0,
+            _ => 1.0,
+        };
+        let picture = PictureContrast::new(&divided((200, 100), 40, noisy));
+        let amplitude = |here: WindowContrast| here.amplitude(1.0, 1e6);
+        let place = picture.worst_place(0.05, 3, amplitude);
+        let most = |without: Option<&_>| picture.zones(1000, 3, without)[0].0.square;
+        assert!((most(None) - 17.0 / 9.0).abs() < 1e-5, "{}", most(None));
+        assert!((most(place.as_ref()) - 10.0 / 9.0).abs() < 1e-5, "{place:?}");
+        // 25 of 1,250 blocks
+        assert_eq!(place.map(|(rows, columns)| rows.len() * columns.len()), Some(25));
+        assert_eq!(picture.worst_place(0.01, 3, amplitude), None);
     }
 
     #[test]

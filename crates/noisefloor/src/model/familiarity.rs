@@ -3,10 +3,9 @@
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
-/// How many times the samples a tile gets that is unlike all known ones: its P is that of the same tile with this
-/// fraction of its samples. Noise falls with samples whatever the texture, so such a tile stops too, at twice what the
-/// model expects.
-pub(crate) const CAUTION: f32 = 2.0;
+/// How much more thresholds scatter, as a standard deviation of ln(samples), in a tile that is unlike all known ones: where 95 % of
+/// people are asked for, it takes twice the samples.
+pub(crate) const UNFAMILIAR: f64 = 0.86;
 
 /// The textures that a model knows, as scaled numbers of its descriptor that describe the picture and not the
 /// noise.

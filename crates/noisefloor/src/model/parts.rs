@@ -1,11 +1,11 @@
 //! What a model consists of, and how that judges a tile.
 
-use super::familiarity::{CAUTION, Familiarity};
+use super::familiarity::{Familiarity, UNFAMILIAR};
 use crate::descriptor::Descriptor;
 use crate::display::ToneMapping;
 use crate::evidence::Evidence;
 use crate::params::Audience;
-use crate::people::Spread;
+use crate::people::{Spread, Unknown};
 use crate::svm::{Classifier, Machine, from_log_odds};
 use noisefloor_vision::Viewing;
 #[cfg(feature = "files")]
@@ -75,8 +75,8 @@ pub struct ModelParts {
 /// What a model says about one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judgement {
-    /// Share of people, in [0, 1], in a scene like those seen, who see no difference. For an unfamiliar tile, that
-    /// with fewer samples than it has: with half of them, if it is unlike all that the model was tried on.
+    /// Share of people, in [0, 1], in a scene like those seen, who see no difference. Of an unfamiliar tile, their
+    /// thresholds scatter more than the model knows.
     pub probability: f32,
     /// The same without the penalty for unfamiliar tiles.
     pub probability_without_penalty: f32,
@@ -103,7 +103,9 @@ impl ModelParts {
         let texture = || self.descriptor.texture().iter().map(|&i| scaled[i]).collect::<Vec<f32>>();
         let strangeness = self.familiarity.as_ref().map_or(0.0, |known| known.strangeness(&texture()));
         let spread = self.spread.map(|s| Spread { people: people.unwrap_or(s.people), ..s });
-        ProbabilityCurve { parts: self, raw, spread, strangeness, projected: scaled }
+        let texture = (UNFAMILIAR * f64::from(strangeness)).powi(2);
+        let unknown = Unknown { texture, ..Unknown::default() };
+        ProbabilityCurve { parts: self, raw, spread, unknown, projected: scaled }
     }
 
     /// Checks that they fit together, and that every number is finite; the error says what does not.
@@ -157,47 +159,54 @@ impl ModelParts {
     }
 }
 
-/// P of one tile as a function of its samples: noise falls as 1/√n, nothing else changes. Texture decides
+/// P of one tile as a function of its samples: noise falls as 1/√n, and so do errors of what is estimated. Texture decides
 /// once how familiar the tile is.
 pub(crate) struct ProbabilityCurve<'a> {
     parts: &'a ModelParts,
     raw: &'a [f32],
     spread: Option<Spread>,
-    strangeness: f32,
+    unknown: Unknown,
     /// Room for the descriptor at another number of samples.
     projected: Vec<f32>,
 }
 
 impl ProbabilityCurve<'_> {
+    /// With what is not known of the tile at its own samples.
+    pub(crate) fn within(self, unknown: Unknown) -> Self {
+        Self { unknown: Unknown { texture: self.unknown.texture, ..unknown }, ..self }
+    }
+
     pub(crate) fn judgement(&mut self) -> Judgement {
         self.projected.copy_from_slice(self.raw);
         let log_odds = self.parts.classifier.log_odds_in_place(&mut self.projected);
-        let free = self.share(log_odds);
-        let probability = if self.strangeness > 0.0 { self.at(1.0).unwrap_or(free) } else { free };
         Judgement {
-            probability,
-            probability_without_penalty: free,
+            probability: self.share(log_odds, self.unknown),
+            probability_without_penalty: self.share(log_odds, Unknown { texture: 0.0, ..self.unknown }),
             mean_observer: from_log_odds(log_odds),
-            unfamiliar: self.strangeness > 0.0,
+            unfamiliar: self.unknown.texture > 0.0,
         }
     }
 
-    fn share(&self, log_odds: f64) -> f32 {
-        self.spread.map_or_else(|| from_log_odds(log_odds), |spread| spread.share(log_odds) as f32)
+    fn share(&self, log_odds: f64, unknown: Unknown) -> f32 {
+        self.spread.map_or_else(|| from_log_odds(log_odds), |spread| spread.share(log_odds, unknown) as f32)
     }
 
     /// P with `factor` times the samples; `None` if the descriptor does not separate noise from picture.
     pub(crate) fn at(&mut self, factor: f32) -> Option<f32> {
-        self.without_penalty(factor / CAUTION.powf(self.strangeness))
+        self.projected_by(factor, self.unknown.after(factor.into()))
     }
 
-    /// The same without the penalty for an unfamiliar tile.
-    pub(crate) fn without_penalty(&mut self, factor: f32) -> Option<f32> {
+    /// The same of noise alone, as if all about it were known.
+    pub(crate) fn known(&mut self, factor: f32) -> Option<f32> {
+        self.projected_by(factor, Unknown::default())
+    }
+
+    fn projected_by(&mut self, factor: f32, unknown: Unknown) -> Option<f32> {
         self.projected.copy_from_slice(self.raw);
         let known = self.parts.descriptor.project(&mut self.projected, factor);
         known.then(|| {
             let log_odds = self.parts.classifier.log_odds_in_place(&mut self.projected);
-            self.share(log_odds)
+            self.share(log_odds, unknown)
         })
     }
 }

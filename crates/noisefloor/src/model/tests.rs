@@ -1,5 +1,6 @@
 use super::file::{FORMAT, ModelFile};
 use super::*;
+use crate::people::Unknown;
 use crate::svm::{Line, Machine, Platt, Scaler, Svm};
 use proptest::prelude::*;
 
@@ -72,9 +73,10 @@ fn the_bundled_model_is_whole_small_and_scored() {
     assert!(model.record().leave_one_scene_out.is_some_and(|s| s.zones == 167));
 }
 
-/// An unfamiliar tile has the P that a familiar one of the same noise has with half of the samples.
+/// Of what is unfamiliar, thresholds scatter more: twice as far as what is familiar by [`UNFAMILIAR`], half of the way there by
+/// half of it.
 #[test]
-fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
+fn thresholds_scatter_more_where_a_tile_is_unfamiliar() {
     let zones = vec![vec![0.5; small().descriptor().texture().len()]];
     let familiarity = Familiarity { zones, reach: 0.1 };
     let cautious = changed(small(), |m| m.familiarity = Some(familiarity)).unwrap();
@@ -82,22 +84,17 @@ fn what_is_unfamiliar_is_judged_as_if_it_had_half_the_samples() {
     assert!(!cautious.judge(&tile).unfamiliar && !small().judge(&tile).unfamiliar);
     assert_eq!(cautious.judge(&tile), small().judge(&tile));
 
-    // Twice as far as what is familiar
-    tile[1] += 0.21;
-    let (careful, careless) = (cautious.judge(&tile), small().judge(&tile));
-    assert!(careful.unfamiliar && !careless.unfamiliar);
-    let mut halved = tile.clone();
-    small().descriptor().project(&mut halved, 0.5);
-    assert_eq!(careful.probability, small().judge(&halved).probability);
-    assert!(careful.probability < careless.probability);
-    assert_eq!(careful.probability_without_penalty, careless.probability);
-
-    // Half of the way there, of the penalty too
-    tile[1] -= 0.06;
-    let between = cautious.judge(&tile);
-    let mut fewer = tile.clone();
-    small().descriptor().project(&mut fewer, 0.5f32.sqrt());
-    assert!((between.probability - small().judge(&fewer).probability).abs() < 1e-3, "{between:?}");
+    let spread = small().spread().unwrap();
+    for (beyond, share) in [(0.21, 1.0), (-0.06, 0.5)] {
+        tile[1] += beyond;
+        let (careful, careless) = (cautious.judge(&tile), small().judge(&tile));
+        assert!(careful.unfamiliar && !careless.unfamiliar);
+        assert_eq!(careful.probability_without_penalty, careless.probability);
+        let odds = (f64::from(careless.mean_observer) / (1.0 - f64::from(careless.mean_observer))).ln();
+        let texture = (super::familiarity::UNFAMILIAR * share).powi(2);
+        let expected = spread.share(odds, Unknown { texture, ..Unknown::default() }) as f32;
+        assert!((careful.probability - expected).abs() < 1e-3, "{careful:?} {expected}");
+    }
 }
 
 #[test]

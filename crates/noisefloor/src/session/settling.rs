@@ -1,11 +1,9 @@
-//! When an exposure is settled again, and from when on it counts as known.
+//! When an exposure is settled again.
 
 use crate::display::Display;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
-/// Standard error of the exposure, as a share of it, up to which tiles may converge.
-const KNOWN: f64 = 0.015;
 /// Change of the exposure, as a share of it, from which on earlier verdicts are looked at again.
 const MOVED: f64 = 0.02;
 /// Growth of all samples after which it is settled again: a pass over the film, as often as its noise has
@@ -25,10 +23,6 @@ pub(crate) struct Settling {
 impl Settling {
     pub(super) fn is_due(&self, samples: u64) -> bool {
         samples as f64 >= GROWTH * self.samples as f64
-    }
-
-    pub(super) fn is_known(&self) -> bool {
-        self.error <= KNOWN
     }
 }
 

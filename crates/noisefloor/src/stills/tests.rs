@@ -85,8 +85,8 @@ fn finished_pictures_lack_light_that_one_alone_has_met() {
         let judged = pair.judge(&Oracle::bundled(), grid, Audience::TRAINED).unwrap();
         // The windows of tiles 1, 4 and 5 have it in sight
         let beyond = [2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15].map(|tile| judged.verdicts()[tile]);
-        assert!(beyond.iter().all(|verdict| verdict.unmet != verdict.converged), "{beyond:?}");
-        beyond.iter().filter(|verdict| verdict.unmet).count()
+        assert!(beyond.iter().all(|verdict| verdict.open_for.is_some() != verdict.converged), "{beyond:?}");
+        beyond.iter().filter(|verdict| verdict.open_for.is_some()).count()
     };
     for unit in [1.0, 1e-6, 1e6] {
         let [plain, lit] = [0.0, 2000.0].map(|lamp| wall(1, unit, lamp));

@@ -44,11 +44,14 @@ fn all_exposed(film: &Film, exposure: f32) -> Vec<Option<MetOnce>> {
     grid().tiles().map(|tile| Some(MetOnce::of(film, &display, tile))).collect()
 }
 
-/// The most that a tile lacks, as a share of the picture's light.
+fn unmet(film: &Film) -> Unmet {
+    Unmet::of(film, &ToneMapping::Srgb { exposure: 1.0 }.settle(&[]), Viewing::default())
+}
+
+/// The most that a tile lacks of light that was met once, as a share of the picture's.
 fn most(film: &Film) -> f64 {
-    let met = all(film);
-    let unmet = Unmet::new(grid(), met, Viewing::default());
-    grid().tiles().map(|tile| unmet.light(film, tile)).fold(0.0, f64::max) / f64::from(BASE)
+    let unmet = unmet(film);
+    grid().tiles().map(|tile| unmet.met_elsewhere(film, tile)).fold(0.0, f64::max) / f64::from(BASE)
 }
 
 /// One dot of radiance 7 in the mean of 10 samples, over 9 tiles or over all 16.
@@ -60,15 +63,37 @@ fn one_find_may_lie_anywhere_around_it_and_in_the_picture() {
     let film = film([&dotted, &flat], [5, 5]);
     let met = all(&film);
     assert!((met[0].unwrap().light - 7.0).abs() < 1e-5, "{met:?}");
-    let unmet = Unmet::new(grid(), met, Viewing::default());
+    let unmet = unmet(&film);
     let place = (PLACE * Viewing::default().pixels_per_degree()).powi(2);
     let spread = |pixels: usize| 7.0 / (pixels as f64 + place);
-    let light = |index: usize| unmet.light(&film, grid().tile(index));
+    let light = |index: usize| unmet.met_elsewhere(&film, grid().tile(index));
     assert_eq!(light(0), 0.0, "it has had its share");
     // At the corner, tiles 1, 4 and 5 are beside it
     for (index, pixels) in [(5, 9 * 1024), (4, 6 * 1024), (15, 16 * 1024)] {
         assert!((light(index) / spread(pixels) - 1.0).abs() < 1e-5, "{index}: {}", light(index));
     }
+}
+
+/// As much light may be missing that nothing has met, in half as much of it for twice the samples; a tile that has met light
+/// of that order lacks none.
+#[test]
+fn what_nothing_has_met_falls_with_the_samples_and_with_what_was_met() {
+    let mut dotted = vec![[BASE; 3]; EDGE * EDGE];
+    let flat = dotted.clone();
+    let light = |film: &Film, tile: usize| unmet(film).light(film, grid().tile(tile));
+    let expected = |samples: f64| NOTHING_MET * f64::from(GREY) / (samples * (EDGE * EDGE) as f64);
+    for samples in [5, 10, 40] {
+        let film = film([&flat, &flat], [samples; 2]);
+        let found = light(&film, 3) / expected(2.0 * samples as f64);
+        assert!((found - 1.0).abs() < 1e-9, "{samples}: {found}");
+        assert_eq!(unmet(&film).kind(&film, grid().tile(3)), OpenFor::FewSamples);
+    }
+    assert_eq!(light(&film([&flat, &flat], [50; 2]), 3), 0.0);
+    // 1024 pixels, each with its share of a find
+    let find = (expected(10.0) * 1024.0) as f32;
+    dotted[5 * EDGE + 6] = [BASE + 2.0 * find; 3];
+    let film = film([&dotted, &flat], [5, 5]);
+    assert!(light(&film, 0) < 1e-3 * light(&film, 15), "{} {}", light(&film, 0), light(&film, 15));
 }
 
 /// What no picture can be made of tells of nothing, in however many places it stands, and hides nothing beside it.
@@ -79,9 +104,12 @@ fn accidents_of_arithmetic_tell_of_no_light() {
     found[5 * EDGE + 6] = [1e5; 3];
     both[5 * EDGE + 6] = [1e5; 3];
     (0..5).for_each(|i| both[(20 + 7 * i) * EDGE + 11] = [1e12; 3]);
-    let [one, other] = [&found, &both].map(|half| all(&film([half, &flat], [5, 5])));
+    let light = |half: &Vec<Rgb>| -> Vec<[f64; 2]> {
+        all(&film([half, &flat], [5, 5])).iter().flatten().map(|met| [met.light, met.by_sample]).collect()
+    };
+    let [one, other] = [&found, &both].map(light);
     assert_eq!(one, other);
-    assert!(one[0].unwrap().light > 4e4);
+    assert!(one[0][0] > 4e4);
 }
 
 /// As Good and Turing have it: what was met once makes up as much as what was not met. Samples find light at
@@ -214,7 +242,7 @@ fn no_tile_is_done_while_light_is_unmet_that_would_be_seen() {
             assert_eq!(stopped, 0, "seed {seed}");
         }
         assert!(without.stops().all(|s| s.reason == crate::StopReason::Converged && s.spp < 400), "{seed}");
-        assert!((0..16).all(|tile| !without.verdict(tile).unwrap().unmet), "seed {seed}");
+        assert!((0..16).all(|tile| without.open_for(tile).is_none()), "seed {seed}");
     }
 }
 
@@ -224,7 +252,7 @@ fn no_tile_is_done_while_light_is_unmet_that_would_be_seen() {
 #[test]
 fn what_is_found_late_opens_what_had_stopped() {
     // The first tile is noisier and stops last; it alone finds light, when the others have stopped
-    let none = Rare { light: 0.0, one_in: f64::INFINITY, from: 0, tiles: 1, first: 2.0 };
+    let none = Rare { light: 0.0, one_in: f64::INFINITY, from: 0, tiles: 1, first: 4.0 };
     let (mut opened, mut checked) = (0, 0);
     for seed in 0..2 {
         let mut without = session(4_000);

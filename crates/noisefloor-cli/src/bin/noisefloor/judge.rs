@@ -108,7 +108,7 @@ fn rows(grid: TileGrid, spp: f64, judged: &JudgedTiles, unlike: &[bool]) -> Vec<
     let row = |(tile, &verdict): (Tile, &Verdict)| {
         let unlike = unlike[tile.index];
         let verdict = if unlike { Verdict::default() } else { verdict };
-        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, unmet, .. } = verdict;
+        let Verdict { converged, probability, threshold, expected_spp, unfamiliar, open_for, .. } = verdict;
         let Tile { index, x, y, width, height } = tile;
         let probability = probability.unwrap_or(0.0);
         Row {
@@ -122,7 +122,7 @@ fn rows(grid: TileGrid, spp: f64, judged: &JudgedTiles, unlike: &[bool]) -> Vec<
             threshold: threshold.map(|threshold| threshold.map(samples)),
             expected_spp: expected_spp.map(samples),
             unfamiliar,
-            unmet,
+            open_for,
             unlike,
         }
     };

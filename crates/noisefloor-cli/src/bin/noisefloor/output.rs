@@ -13,7 +13,7 @@ use crate::job::RenderJob;
 use anyhow::{Context, bail};
 use noisefloor::{
     Checkpoint, Rgb, Session,
-    criterion::ExpectedThreshold,
+    criterion::{ExpectedThreshold, OpenFor},
     driver::{Clock, Progress},
     stills::SampleOrigin,
 };
@@ -27,6 +27,7 @@ use noisefloor_rivals::metrics::relative_mse;
 use report::Report;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
@@ -326,9 +327,13 @@ fn typical_threshold(session: &Session) -> Option<ExpectedThreshold> {
     thresholds.get(thresholds.len() / 2).copied()
 }
 
-/// Tiles that are not done, or reached a limit, only for light that they may not have met.
-fn unmet_tiles(session: &Session) -> usize {
-    (0..session.film().grid().len()).filter(|&tile| session.verdict(tile).is_some_and(|v| v.unmet)).count()
+/// How many tiles are open, or reached a limit, for what.
+fn open_for(session: &Session) -> BTreeMap<OpenFor, usize> {
+    let mut counts = BTreeMap::new();
+    for why in (0..session.film().grid().len()).filter_map(|tile| session.open_for(tile)) {
+        *counts.entry(why).or_insert(0) += 1;
+    }
+    counts
 }
 
 /// Samples that uniform rendering at the largest stop would take, over all pixels.

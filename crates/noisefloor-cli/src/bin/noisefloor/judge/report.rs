@@ -1,6 +1,9 @@
 //! Verdicts as a table or as JSON.
 
-use noisefloor::{Oracle, People, criterion::ExpectedThreshold};
+use noisefloor::{
+    Oracle, People,
+    criterion::{ExpectedThreshold, OpenFor},
+};
 use noisefloor_cli::say::{NotSaid, say, say_json};
 use serde::Serialize;
 use std::path::Path;
@@ -19,11 +22,10 @@ pub(super) struct Row {
     pub(super) threshold: Option<ExpectedThreshold>,
     /// Samples per pixel at which the tile should be converged; null if that is out of sight.
     pub(super) expected_spp: Option<u64>,
-    /// Whether its texture is unlike any that the model has been tested on; P is then that of half the
-    /// samples.
+    /// Whether its texture is unlike any that the model has been tested on, which lowers P.
     pub(super) unfamiliar: bool,
-    /// Whether it is not converged only for light that neither picture may have met.
-    pub(super) unmet: bool,
+    /// What keeps it from being converged; null if nothing does.
+    pub(super) open_for: Option<OpenFor>,
     /// Whether the pictures differ there by more than noise: it is not judged then, and P is 0.
     pub(super) unlike: bool,
 }
@@ -72,7 +74,7 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
         let verdict = match row {
             Row { unlike: true, .. } => "not judged",
             Row { converged: true, .. } => "converged",
-            Row { unmet: true, .. } => "light?",
+            Row { open_for: Some(OpenFor::UnmetLight | OpenFor::FewSamples), .. } => "light?",
             _ => "noise seen",
         };
         let expected = row.expected_spp.filter(|_| !row.converged).map_or(String::new(), |n| n.to_string());
@@ -94,15 +96,16 @@ fn say_table(report: &Report<'_>) -> Result<(), NotSaid> {
         report.spp,
         report.people
     )?;
-    let unmet = report.tiles.iter().filter(|row| row.unmet).count();
+    let lacks = |row: &&Row| matches!(row.open_for, Some(OpenFor::UnmetLight | OpenFor::FewSamples));
+    let unmet = report.tiles.iter().filter(lacks).count();
     if unmet > 0 {
         say!(
-            "tiles whose noise is not seen, but which are likely to lack light that few samples have met: {unmet} (light?)"
+            "tiles whose noise is not seen, but which are likely to lack light that few samples or none have met: {unmet} (light?)"
         )?;
     }
     if report.unfamiliar_tiles > 0 {
         say!(
-            "tiles with texture or light unlike any that the model was tested on: {}; their P is that of fewer samples, down to half, and less certain",
+            "tiles with texture or light unlike any that the model was tested on: {}; their P is lower, as it is less certain",
             report.unfamiliar_tiles
         )?;
     }

@@ -15,6 +15,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+/// Samples of a picture from which light that is seldom met is hardly ever missed: the chance to have met nothing of light that
+/// one in 250,000 finds is then 2·10⁻⁴.
+const MANY: u64 = 1 << 21;
+
 /// The denoiser of a render, and what its verdicts looked at.
 pub struct Denoised {
     denoiser: Box<dyn Denoiser>,
@@ -177,6 +181,12 @@ impl Output {
             (false, false) => "",
         };
         say!("{spp:.0} spp denoised by {denoiser}{with}; {without}")?;
+        let samples = session.film().total_samples();
+        if samples < MANY {
+            say!(
+                "of light that one in {samples} samples meets, these may have met none: it is missing then"
+            )?;
+        }
         if undenoised_tiles > 0 {
             say!(
                 "{undenoised_tiles} of {} tiles are shown as rendered: the denoiser takes away more than their noise",

@@ -2,9 +2,12 @@
 
 use super::denoised::DenoisedReport;
 use super::tiles::TileState;
-use super::{Output, Over, typical_threshold, uniform_samples, unmet_tiles};
+use super::{Output, Over, open_for, typical_threshold, uniform_samples};
 use crate::job::RenderJob;
-use noisefloor::{Params, Session, criterion::ExpectedThreshold};
+use noisefloor::{
+    Params, Session,
+    criterion::{ExpectedThreshold, OpenFor},
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -37,9 +40,8 @@ pub(super) struct Report<'a> {
     stops: BTreeMap<String, usize>,
     /// Tiles with texture unlike any that the model has been tried on.
     unfamiliar_tiles: usize,
-    /// Tiles that are open, or reached a limit, only for light that one half of the samples alone has met elsewhere: as
-    /// much would be seen if it fell on them.
-    unmet_light_tiles: usize,
+    /// Tiles that are open, or reached a limit, by what keeps them from being done.
+    open_for: BTreeMap<OpenFor, usize>,
     /// Where people are expected to stop seeing noise in the typical tile, in samples per pixel.
     expected_threshold: Option<ExpectedThreshold>,
     /// Share of people who see no noise anywhere in the picture, by the last verdicts on its tiles.
@@ -112,7 +114,7 @@ impl<'a> Report<'a> {
             tiles: tiles.len(),
             stops,
             unfamiliar_tiles: tiles.iter().filter(|tile| tile.stop.unfamiliar).count(),
-            unmet_light_tiles: unmet_tiles(session),
+            open_for: open_for(session),
             expected_threshold: typical_threshold(session),
             people_in_picture: session.share_in_picture(),
             samples: session.film().total_samples(),

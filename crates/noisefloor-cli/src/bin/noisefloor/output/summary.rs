@@ -1,8 +1,8 @@
 //! A render in a few lines, for people.
 
-use super::{CHECKPOINT, Output, typical_threshold, uniform_samples, unmet_tiles};
+use super::{CHECKPOINT, Output, open_for, typical_threshold, uniform_samples};
 use crate::job::CriterionJob;
-use noisefloor::{Audience, Session, driver::Clock};
+use noisefloor::{Audience, Session, criterion::OpenFor, display::luminance, driver::Clock};
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_cli::sources::Source;
 use noisefloor_ptwne::ReferenceNoise;
@@ -84,24 +84,65 @@ impl Output {
         if let Some(share) = session.share_in_picture() {
             say!("{:.0} % of people see no noise anywhere in the picture", 100.0 * share)?;
         }
-        let unmet = unmet_tiles(session);
-        if unmet > 0 {
-            say!(
-                "tiles that only light keeps from being done which they may not have met: {unmet}; \
-                 only one half of the samples has met it elsewhere, \
-                 and as much would be seen if it fell on them"
-            )?;
-        }
+        self.say_open_for(session)?;
         let unfamiliar = session.stops().filter(|s| s.unfamiliar).count();
         if unfamiliar > 0 {
             say!(
                 "tiles with texture or light unlike any that the model was tested on: {unfamiliar}; \
-                 they get up to twice the samples it asks for, up to --max-spp, \
-                 and their verdicts are less certain"
+                 their verdicts are less certain, and take up to twice the samples for it"
             )?;
         }
         Ok(())
     }
+
+    /// Says what keeps tiles open, where that is not their noise in more than a tenth of them.
+    fn say_open_for(&self, session: &Session) -> Result<(), NotSaid> {
+        let (counts, tiles) = (open_for(session), session.film().grid().len());
+        let other =
+            counts.iter().filter(|(why, _)| **why != OpenFor::Noise).map(|(_, count)| count).sum::<usize>();
+        if session.criterion().only_counts() || other * 10 <= tiles {
+            return Ok(());
+        }
+        for (&why, count) in &counts {
+            match why {
+                OpenFor::Exposure => say!(
+                    "{count} tiles wait for the exposure, which so few samples do not tell yet; --exposure sets one"
+                )?,
+                OpenFor::UnmetLight => {
+                    let dot = brightest_find(session).map(|(x, y, share)| {
+                        format!(": that at ({x}, {y}) is {:.0} % of all such light", 100.0 * share)
+                    });
+                    say!(
+                        "{count} tiles wait for light that they may not have met: few samples have met it elsewhere, \
+                         and as much would be seen in them{}",
+                        dot.unwrap_or_default()
+                    )?;
+                }
+                OpenFor::FewSamples => say!(
+                    "{count} tiles wait for more samples: of light that one in {} meets, these may have met none",
+                    session.film().total_samples()
+                )?,
+                OpenFor::Doubt => say!("{count} tiles wait since the samples are doubted: see the warnings")?,
+                _ => (),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The pixel that has most of the light which one half alone has met, and its share of all of that.
+fn brightest_find(session: &Session) -> Option<(usize, usize, f64)> {
+    let (film, width) = (session.film(), session.film().grid().width());
+    let found = |(tile, pixel): (usize, usize)| {
+        let [a, b] = film.pixel_halves(tile, pixel).map(|(mean, _)| f64::from(luminance(mean)));
+        ((a - b).abs(), pixel)
+    };
+    let pixels =
+        film.grid().tiles().flat_map(|tile| tile.rows(width).flatten().map(move |pixel| (tile.index, pixel)));
+    let (all, (most, pixel)) = pixels
+        .map(found)
+        .fold((0.0, (0.0, 0)), |(all, most), one| (all + one.0, if one.0 > most.0 { one } else { most }));
+    (most > 0.0).then(|| (pixel % width, pixel / width, most / all))
 }
 
 /// What a reference is like.

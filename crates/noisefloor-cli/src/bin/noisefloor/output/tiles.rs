@@ -1,6 +1,6 @@
 //! What is known of each tile: stops.csv.
 
-use noisefloor::{Session, Stop, StopReason, Tile};
+use noisefloor::{Session, Stop, StopReason, Tile, criterion::OpenFor};
 use noisefloor_image::maps::{ColourScale, TileMark};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 pub(super) struct TileState {
     pub(super) stop: Stop,
     pub(super) open: bool,
+    open_for: Option<OpenFor>,
     /// What the denoised picture has lost there.
     lost: Option<f64>,
 }
@@ -24,6 +25,8 @@ pub(super) struct StopRow {
     spp: u64,
     probability: Option<f32>,
     reason: String,
+    /// What keeps it from being done, or has kept it until a limit.
+    open_for: Option<OpenFor>,
     unfamiliar: bool,
     /// With a denoiser: by the estimate when the tile was last judged.
     jods_lost: Option<f64>,
@@ -39,7 +42,8 @@ pub(super) fn states(session: &Session) -> Vec<TileState> {
             verdict.map_or(stop, |verdict| stop.with_verdict(&verdict))
         };
         let lost = verdict.and_then(|verdict| verdict.lost).filter(|lost| lost.is_finite());
-        TileState { stop: stop.copied().unwrap_or_else(so_far), open: stop.is_none(), lost }
+        let open_for = session.open_for(tile.index);
+        TileState { stop: stop.copied().unwrap_or_else(so_far), open: stop.is_none(), open_for, lost }
     };
     session.film().grid().tiles().map(state).collect()
 }
@@ -60,14 +64,18 @@ impl TileState {
     pub(super) fn row(&self) -> StopRow {
         let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
         let (tile, reason) = (index, self.reason());
-        StopRow { tile, x, y, width, height, spp, probability, reason, unfamiliar, jods_lost: self.lost }
+        let (open_for, jods_lost) = (self.open_for, self.lost);
+        StopRow { tile, x, y, width, height, spp, probability, reason, open_for, unfamiliar, jods_lost }
     }
 
     fn mark(&self) -> TileMark {
         TileMark {
             tile: self.stop.tile,
             value: self.stop.spp as f64,
-            label: format!("{}{}", self.stop.spp, if self.open { "+" } else { "" }),
+            label: match self.open_for.filter(|why| *why != OpenFor::Noise) {
+                Some(why) => format!("{} {}", self.stop.spp, why.name()),
+                None => format!("{}{}", self.stop.spp, if self.open { "+" } else { "" }),
+            },
             unfamiliar: self.stop.unfamiliar,
         }
     }

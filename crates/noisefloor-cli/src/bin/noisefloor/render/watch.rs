@@ -3,7 +3,7 @@
 use super::saving::Pace;
 use crate::job::WatchPage;
 use crate::output::Output;
-use noisefloor::{Rgb, Session, driver::Progress};
+use noisefloor::{Rgb, Session, criterion::OpenFor, driver::Progress};
 use noisefloor_cli::say::{note, one_line};
 use noisefloor_image::maps::Canvas;
 use noisefloor_pages::http::Exposure;
@@ -60,7 +60,9 @@ impl Page {
         let tile = |tile: noisefloor::Tile| {
             let probability = session.verdict(tile.index).and_then(|verdict| verdict.probability);
             let (spp, open) = (film.spp(tile.index), session.is_open(tile.index));
-            LiveTile { x: tile.x, y: tile.y, width: tile.width, height: tile.height, spp, probability, open }
+            let open_for = session.open_for(tile.index).map(OpenFor::name);
+            let noisefloor::Tile { x, y, width, height, .. } = tile;
+            LiveTile { x, y, width, height, spp, probability, open, open_for }
         };
         (self.state.width, self.state.height) = (film.grid().width(), film.grid().height());
         self.state.tiles = film.grid().tiles().map(tile).collect();
