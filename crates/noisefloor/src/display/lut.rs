@@ -1,6 +1,6 @@
 //! Colour look-up tables as tone mappings.
 
-use crate::display::{ToneCurve, srgb_encode};
+use super::{srgb::srgb_encode, tone_curve::ToneCurve};
 use crate::rgb::Rgb;
 use std::fmt;
 use std::str::FromStr;
