@@ -10,8 +10,8 @@ use crate::unmet::unmet_error;
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
     criterion::{CriterionError, Needs, OpenFor, View},
-    display::Display,
-    evidence::TilePlanes,
+    display::{Display, luminance},
+    evidence::{Plane, TilePlanes},
     unmet::Unmet,
 };
 use noisefloor_vision::{VisionModel, VisionWorkspace};
@@ -392,7 +392,8 @@ fn judge_tile(
     // What a denoiser smears however many samples it gets is done when the noise is: no tile takes more samples denoised.
     // The noise is seen on the picture without noise, as good as the denoiser knows it; one that knows nothing of it, such as
     // a black one, hides no noise
-    let [on_denoised, on_rendered] = [Some(error.part(place).shown().to_vec()), None]
+    let part = error.part(place);
+    let [on_denoised, on_rendered] = [Some(part.shown_in_channels().collect()), None]
         .map(|shown| noise_of(film, view.display, tile, shown))
         .map(|noise| (eyes.lost(&noise, 1.0), noise));
     let (of_noise, noise) = if on_denoised.0 >= on_rendered.0 { on_denoised } else { on_rendered };
@@ -457,8 +458,11 @@ pub fn spp_without_denoising(
     let (grid, model) = (film.grid(), VisionModel::new(&viewing));
     let tiles: Vec<Tile> = grid.tiles().collect();
     let samples = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
-        let shown = tile.rows(grid.width()).flatten().map(|pixel| display.luma(denoised[pixel])).collect();
-        let noise = noise_of(film, display, tile, Some(shown));
+        let shown: Vec<Rgb> =
+            tile.rows(grid.width()).flatten().map(|pixel| display.encode(denoised[pixel])).collect();
+        let luma: Vec<f32> = shown.iter().map(|&pixel| luminance(pixel)).collect();
+        let [red, blue] = [0, 2].map(|c| shown.iter().map(|pixel| pixel[c]).collect::<Vec<f32>>());
+        let noise = noise_of(film, display, tile, Some(vec![&luma, &red, &blue]));
         let mut eyes = Eyes { model: &model, room };
         let spp = eyes.needed(&noise, limit, (film.spp(tile.index), DECAY))?;
         Some(spp as f64 * tile.pixels() as f64)
@@ -491,7 +495,8 @@ pub fn spp_with_denoising(
         let mut eyes = Eyes { model: &model, room };
         let limit = limit / stops_err_by(tiles.len());
         let (here, _) = judged_by(&error, tile, limit, &mut eyes);
-        let noise = noise_of(film, display, tile, Some(error.part(tile).shown().to_vec()));
+        let part = error.part(tile);
+        let noise = noise_of(film, display, tile, Some(part.shown_in_channels().collect()));
         Some(eyes.needed_by_either([&here, &noise], limit, film.spp(tile.index))? as f64)
     });
     let needs: Option<Vec<f64>> = needs.collect();
@@ -501,12 +506,21 @@ pub fn spp_with_denoising(
     Ok(needs.map(|needs| sum(needs) / (size.0 * size.1) as f64))
 }
 
-/// The noise of a tile of the film, as displayed, on what is shown there, or on itself.
-fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Option<Vec<f32>>) -> DenoisedError {
+/// The noise of a tile of the film, as displayed, on what is shown there, in Y′ or in Y′, R′ and B′, or on itself.
+fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Option<Vec<&[f32]>>) -> DenoisedError {
     let planes = TilePlanes::from_halves(film, display, tile);
-    let shown = shown.unwrap_or_else(|| planes.image.inside(planes.inner).collect());
-    let noise = planes.residual.inside(planes.inner).collect();
-    DenoisedError::of((tile.width, tile.height), shown, noise, display)
+    let mut channels = vec![[&planes.image, &planes.residual]];
+    if let Some(colour) = &planes.colour {
+        channels.extend([0, 2].map(|c| [&colour.image[c], &colour.residual[c]]));
+    }
+    let channel = |(n, [image, residual]): (usize, &[&Plane; 2])| {
+        // What is shown without colour is grey
+        let given = shown.as_ref().map(|shown| shown.get(n).unwrap_or(&shown[0]).to_vec());
+        let shown = given.unwrap_or_else(|| image.inside(planes.inner).collect());
+        [shown, residual.inside(planes.inner).collect()]
+    };
+    let channels = channels.iter().enumerate().map(channel).collect();
+    DenoisedError::of((tile.width, tile.height), channels, display)
 }
 
 #[cfg(test)]

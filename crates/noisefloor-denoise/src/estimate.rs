@@ -18,6 +18,9 @@
 //! denoised halves, plus, of each scale of the mean residual, the share that both halves have in common. Lines and dots, of
 //! which such averages show little, are looked for by themselves (`thin.rs`).
 //!
+//! All of it is of luminance Y′ as displayed; where what either pair of halves differs by is strongly coloured, also of R′ and B′, each by
+//! itself, and the vision model then sees colours.
+//!
 //! In a film whose frames have noise of their own, the variance is new in each frame, and the bias stands still: the
 //! vision model gets them apart.
 //!
@@ -26,9 +29,14 @@
 use crate::bands::{LocalMeans, Plane};
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::{DenoiseError, cut};
-use crate::parts::within;
+use crate::parts::{whole, within};
 use crate::thin::thin_bias;
-use noisefloor::{Rgb, Tile, Viewing, display::Display, evidence::TilePlanes, internal::held};
+use noisefloor::{
+    Rgb, Tile, Viewing,
+    display::{Display, luminance},
+    evidence::TilePlanes,
+    internal::held,
+};
 use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 
@@ -65,16 +73,38 @@ pub(crate) type PartError = (Tile, DenoisedError);
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenoisedError {
     size: (usize, usize),
-    shown: Vec<f32>,
-    residual: Vec<f32>,
-    /// What of the residual is the same in every frame of a film; empty for none.
-    standing: Vec<f32>,
+    /// Of luminance Y′; and of R′ and B′, where noise or what a denoiser makes of it is strongly coloured.
+    fields: Vec<Field>,
     /// Of each pixel, for its brightness; empty where that is not in question.
     light: Vec<Light>,
     display: Display,
 }
 
-/// One pixel on the display: luminance Y′ of the denoised mean, half the difference of the denoised halves, what a white
+/// A picture as displayed, in one channel, and what may be wrong with it.
+#[derive(Clone, Debug, PartialEq)]
+struct Field {
+    shown: Vec<f32>,
+    residual: Vec<f32>,
+    /// What of the residual is the same in every frame of a film; empty for none.
+    standing: Vec<f32>,
+}
+
+impl Field {
+    fn planes(&mut self) -> [&mut Vec<f32>; 3] {
+        [&mut self.shown, &mut self.residual, &mut self.standing]
+    }
+}
+
+/// What a display makes of radiance in one channel.
+type Channel = fn(&Display, Rgb) -> f32;
+/// Luminance Y′, R′ and B′.
+const CHANNELS: [Channel; 3] = [
+    |display, pixel| display.luma(pixel),
+    |display, pixel| display.encode(pixel)[0],
+    |display, pixel| display.encode(pixel)[2],
+];
+
+/// One pixel on the display, in one channel: that of the denoised mean, half the difference of the denoised halves, what a white
 /// dot of one half adds to the mean, and the residuals of both halves.
 type Displayed = [f32; 5];
 
@@ -92,31 +122,25 @@ impl DenoisedError {
         if let Some(odd) = pictures.into_iter().find(|p| size.0.checked_mul(size.1) != Some(p.len())) {
             return Err(DenoiseError::Pixels { size, got: odd.len() });
         }
-        let all: Vec<Displayed> = (0..noisy[0].len())
-            .into_par_iter()
-            .map(|i| displayed(display, noisy.map(|p| p[i]), denoised.map(|p| p[i])))
+        let coloured = [noisy, denoised].iter().any(|halves| is_coloured(size, *halves, display));
+        let channels = if coloured { &CHANNELS[..] } else { &CHANNELS[..1] };
+        let all: Vec<Vec<Displayed>> = channels
+            .iter()
+            .map(|&of| {
+                let pixels = (0..noisy[0].len()).into_par_iter();
+                pixels
+                    .map(|i| displayed((display, of), noisy.map(|p| p[i]), denoised.map(|p| p[i])))
+                    .collect()
+            })
             .collect();
-        let plane = |n: usize| Plane::new(size, all.par_iter().map(|pixel| pixel[n]).collect());
-        let mut residual = plane(1).values;
-        settle_sign(&mut residual);
-        // Nothing is added to what is white already: the picture is shown without it
-        let without = |(pixel, &residual): (&Displayed, &f32)| {
-            if residual > 0.0 { pixel[0] - pixel[2] } else { pixel[0] }
-        };
-        let shown = all.par_iter().zip(&residual).map(without).collect();
-        let mut standing = vec![0.0; all.len()];
-        let residuals = [plane(3), plane(4)];
-        add_common([&mut residual, &mut standing], residuals.clone());
-        // A line is in what both have in common as far as its surroundings have it
-        let lacking =
-            thin_bias(size, residuals.each_ref().map(|residual| residual.values.as_slice()), &standing);
-        for ((sum, standing), lacking) in residual.iter_mut().zip(&mut standing).zip(lacking) {
-            *sum += lacking;
-            *standing += lacking;
-        }
+        let plane = |all: &[Displayed], n: usize| all.par_iter().map(|pixel| pixel[n]).collect();
+        let mut residuals: Vec<Vec<f32>> = all.iter().map(|all| plane(all, 1)).collect();
+        settle_sign(&mut residuals);
+        let field = |(all, residual): (&Vec<Displayed>, _)| field(size, all, residual);
+        let fields = all.iter().zip(residuals).map(field).collect();
         let light = |i: usize| Light::new(noisy.map(|p| p[i]), denoised.map(|p| p[i]));
         let light = (0..noisy[0].len()).into_par_iter().map(light).collect();
-        Ok(Self { size, shown, residual, standing, light, display: display.clone() })
+        Ok(Self { size, fields, light, display: display.clone() })
     }
 
     /// The error of a picture whose truth is known, in the same form: for comparison. In a film, all of it is taken
@@ -134,10 +158,15 @@ impl DenoisedError {
         {
             return Err(DenoiseError::Pixels { size, got: odd.len() });
         }
-        let shown: Vec<f32> = truth.iter().map(|&p| display.luma(p)).collect();
-        let residual = picture.iter().zip(&shown).map(|(&p, truth)| display.luma(p) - truth).collect();
+        let coloured = is_coloured(size, [picture, truth], display);
+        let field = |of: &Channel| {
+            let shown: Vec<f32> = truth.iter().map(|&p| of(display, p)).collect();
+            let residual = picture.iter().zip(&shown).map(|(&p, truth)| of(display, p) - truth).collect();
+            Field { shown, residual, standing: Vec::new() }
+        };
+        let fields = CHANNELS[..if coloured { 3 } else { 1 }].iter().map(field).collect();
         let light = picture.iter().zip(truth).map(|(&p, &t)| Light::new([t; 2], [p; 2])).collect();
-        Ok(Self { size, shown, residual, standing: Vec::new(), light, display: display.clone() })
+        Ok(Self { size, fields, light, display: display.clone() })
     }
 
     /// The same with a brightness that is not in question: all that [`DenoisedError::map_of_jods_lost`] needs.
@@ -154,21 +183,22 @@ impl DenoisedError {
     /// Luminance Y′ of the picture as displayed, row-major, in [0, 1], without white dots that one half of its samples
     /// alone has.
     pub fn shown(&self) -> &[f32] {
-        &self.shown
+        &self.fields[0].shown
     }
 
     /// What may be wrong with it at each pixel, in the same unit. Its size is what is expected; its sign, and
     /// the places of its details, are one possibility of many.
     pub fn residual(&self) -> &[f32] {
-        &self.residual
+        &self.fields[0].residual
     }
 
     /// What a tile is judged by: see [`noisefloor::Oracle::describe`].
     pub fn planes(&self, tile: Tile, viewing: Viewing) -> TilePlanes {
         let planes = TilePlanes::gather(self.size, tile, |x, y| {
             let pixel = y * self.size.0 + x;
-            let (shown, residual) = (self.shown[pixel], self.residual[pixel]);
-            ([shown + 0.5 * residual; 3], [residual; 3])
+            let shown = self.pixel(pixel, |field| &field.shown);
+            let residual = self.pixel(pixel, |field| &field.residual);
+            (std::array::from_fn(|c| shown[c] + 0.5 * residual[c]), residual)
         });
         TilePlanes { viewing, ..planes }
     }
@@ -199,7 +229,8 @@ impl DenoisedError {
         if height == 0.0 {
             return Ok(lost);
         }
-        let level = self.shown.iter().sum::<f32>() / self.shown.len().max(1) as f32;
+        let shown = self.shown();
+        let level = shown.iter().sum::<f32>() / shown.len().max(1) as f32;
         Ok(lost.max(jods_of_edge((level, height), seen_size(self.size), eyes, room)?))
     }
 
@@ -214,18 +245,23 @@ impl DenoisedError {
 
     /// The same of another strength.
     pub(crate) fn scaled(mut self, by: f32) -> Self {
-        self.residual.iter_mut().chain(&mut self.standing).for_each(|error| *error *= by);
+        for Field { residual, standing, .. } in &mut self.fields {
+            residual.iter_mut().chain(standing).for_each(|error| *error *= by);
+        }
         self
     }
 
     /// A tile of it, alone.
     pub(crate) fn part(&self, tile: Tile) -> Self {
         let width = self.size.0;
+        let part = |field: &Field| Field {
+            shown: cut(&field.shown, width, tile),
+            residual: cut(&field.residual, width, tile),
+            standing: cut(&field.standing, width, tile),
+        };
         Self {
             size: (tile.width, tile.height),
-            shown: cut(&self.shown, width, tile),
-            residual: cut(&self.residual, width, tile),
-            standing: cut(&self.standing, width, tile),
+            fields: self.fields.iter().map(part).collect(),
             light: cut(&self.light, width, tile),
             display: self.display.clone(),
         }
@@ -233,24 +269,54 @@ impl DenoisedError {
 
     /// Takes over what a newer estimate, of the rectangle `part`, says of `tile` in it.
     pub(crate) fn renew(&mut self, tile: Tile, newer: &Self, part: Tile) {
+        // What has no colour has that of greys
+        let channels = self.fields.len().max(newer.fields.len());
+        let first = self.fields[0].clone();
+        self.fields.resize(channels, first);
+        for (n, field) in self.fields.iter_mut().enumerate() {
+            let mut newer = newer.fields.get(n).unwrap_or(&newer.fields[0]).clone();
+            let (own, from) = (tile.rows(self.size.0), within(tile, part).rows(part.width));
+            for (own, from) in own.zip(from) {
+                for (plane, newer) in field.planes().into_iter().zip(newer.planes()) {
+                    plane[own.clone()].copy_from_slice(&newer[from.clone()]);
+                }
+            }
+        }
         let (own, from) = (tile.rows(self.size.0), within(tile, part).rows(part.width));
         for (own, from) in own.zip(from) {
-            self.shown[own.clone()].copy_from_slice(&newer.shown[from.clone()]);
-            self.residual[own.clone()].copy_from_slice(&newer.residual[from.clone()]);
-            self.standing[own.clone()].copy_from_slice(&newer.standing[from.clone()]);
             self.light[own].copy_from_slice(&newer.light[from]);
         }
     }
 
-    /// A picture as displayed with this wrong with it, whose brightness is not in question.
+    /// A picture as displayed with this wrong with it, in Y′ or in Y′, R′ and B′, whose brightness is not in question.
     pub(crate) fn of(
         size: (usize, usize),
-        shown: Vec<f32>,
-        mut residual: Vec<f32>,
+        shown_and_residual: Vec<[Vec<f32>; 2]>,
         display: &Display,
     ) -> Self {
-        settle_sign(&mut residual);
-        Self { size, shown, residual, standing: Vec::new(), light: Vec::new(), display: display.clone() }
+        let (shown, mut residuals): (Vec<_>, Vec<_>) =
+            shown_and_residual.into_iter().map(|[shown, residual]| (shown, residual)).unzip();
+        settle_sign(&mut residuals);
+        let field = |(shown, residual)| Field { shown, residual, standing: Vec::new() };
+        let fields = shown.into_iter().zip(residuals).map(field).collect();
+        Self { size, fields, light: Vec::new(), display: display.clone() }
+    }
+
+    /// What is shown in each channel: Y′, or Y′, R′ and B′.
+    pub(crate) fn shown_in_channels(&self) -> impl Iterator<Item = &[f32]> {
+        self.fields.iter().map(|field| field.shown.as_slice())
+    }
+
+    /// R′, G′ and B′ of a pixel, in one of the planes.
+    fn pixel(&self, at: usize, of: impl Fn(&Field) -> &Vec<f32>) -> Rgb {
+        match &self.fields[..] {
+            [luma, red, blue] => {
+                let [luma, r, b] = [luma, red, blue].map(|field| of(field)[at]);
+                let green = (luma - luminance([r, 0.0, b])) / luminance([0.0, 1.0, 0.0]);
+                [r, green, b]
+            }
+            fields => [of(&fields[0])[at]; 3],
+        }
     }
 
     /// A map of just-objectionable differences lost, row-major.
@@ -272,27 +338,62 @@ impl DenoisedError {
         room: &'a mut VisionWorkspace,
     ) -> Result<VisionComparison<'a>, VisionError> {
         let size = seen_size(self.size);
-        let with = |error: &[f32]| -> Vec<Rgb> {
-            let pixels = self.shown.iter().zip(error).map(|(shown, error)| [shown + contrast * error; 3]);
-            seen(self.size, pixels.collect())
+        let pixels = 0..self.shown().len();
+        let with = |error: fn(&Field) -> &Vec<f32>| -> Vec<Rgb> {
+            let pixel = |i: usize| {
+                let (shown, error) = (self.pixel(i, |field| &field.shown), self.pixel(i, error));
+                std::array::from_fn(|c| shown[c] + contrast * error[c])
+            };
+            seen(self.size, pixels.clone().map(pixel).collect())
         };
-        let reference = seen(self.size, self.shown.iter().map(|&shown| [shown; 3]).collect());
-        let test = with(&self.residual);
-        if self.standing.is_empty() || eyes.viewing().frames_per_second().is_none() {
+        let shown = pixels.clone().map(|i| self.pixel(i, |field| &field.shown)).collect();
+        let reference = seen(self.size, shown);
+        let test = with(|field| &field.residual);
+        if self.fields[0].standing.is_empty() || eyes.viewing().frames_per_second().is_none() {
             return eyes.compare(&test, &reference, size, room);
         }
-        eyes.compare_frame(&test, &with(&self.standing), &reference, size, room)
+        eyes.compare_frame(&test, &with(|field| &field.standing), &reference, size, room)
     }
 }
 
-/// Of a difference of two halves, either sign is as likely. One has to be taken, whichever half is which: that which has
-/// the stronger peaks.
-fn settle_sign(difference: &mut [f32]) {
+/// Of a difference of two halves, either sign is as likely. One has to be taken for all channels, whichever half is which: that
+/// with the stronger peaks in the first channel that has any.
+fn settle_sign(channels: &mut [Vec<f32>]) {
+    let first = |difference: &Vec<f32>| difference.iter().copied().find(|&value| value != 0.0);
+    let Some((difference, first)) = channels.iter().find_map(|of| Some((of, first(of)?))) else { return };
     let skew: f64 = difference.iter().map(|&value| f64::from(value).powi(3)).sum();
-    let first = difference.iter().find(|&&value| value != 0.0);
-    if skew < 0.0 || (skew == 0.0 && first.is_some_and(|&value| value < 0.0)) {
-        difference.iter_mut().for_each(|value| *value = -*value);
+    if skew < 0.0 || (skew == 0.0 && first < 0.0) {
+        channels.iter_mut().flatten().for_each(|value| *value = -*value);
     }
+}
+
+/// Whether two pictures differ in strongly coloured ways, as [`TilePlanes`] tell.
+fn is_coloured(size: (usize, usize), pair: [&[Rgb]; 2], display: &Display) -> bool {
+    let planes = TilePlanes::gather(size, whole(size), |x, y| {
+        let [a, b] = pair.map(|picture| display.encode(picture[y * size.0 + x]));
+        (std::array::from_fn(|c| 0.5 * (a[c] + b[c])), std::array::from_fn(|c| 0.5 * (a[c] - b[c])))
+    });
+    planes.colour.is_some()
+}
+
+/// The error in one channel, whose half difference of the denoised halves has its sign.
+fn field(size: (usize, usize), all: &[Displayed], mut residual: Vec<f32>) -> Field {
+    let plane = |n: usize| Plane::new(size, all.par_iter().map(|pixel| pixel[n]).collect());
+    // Nothing is added to what is white already: the picture is shown without it
+    let without = |(pixel, &residual): (&Displayed, &f32)| {
+        if residual > 0.0 { pixel[0] - pixel[2] } else { pixel[0] }
+    };
+    let shown = all.par_iter().zip(&residual).map(without).collect();
+    let mut standing = vec![0.0; all.len()];
+    let residuals = [plane(3), plane(4)];
+    add_common([&mut residual, &mut standing], residuals.clone());
+    // A line is in what both have in common as far as its surroundings have it
+    let lacking = thin_bias(size, residuals.each_ref().map(|residual| residual.values.as_slice()), &standing);
+    for ((sum, standing), lacking) in residual.iter_mut().zip(&mut standing).zip(lacking) {
+        *sum += lacking;
+        *standing += lacking;
+    }
+    Field { shown, residual, standing }
 }
 
 /// The vision model compares no picture with a side of one pixel: it gets two that are the same.
@@ -311,20 +412,20 @@ fn seen((width, height): (usize, usize), pixels: Vec<Rgb>) -> Vec<Rgb> {
 
 /// Shows one pixel. Residuals are multiplied by the slope of the display at the denoised mean: the display
 /// would bend noise so that its mean moves, and the bend would pass for bias.
-fn displayed(display: &Display, noisy: [Rgb; 2], denoised: [Rgb; 2]) -> Displayed {
+fn displayed((display, of): (&Display, Channel), noisy: [Rgb; 2], denoised: [Rgb; 2]) -> Displayed {
     let mean: Rgb = std::array::from_fn(|c| (0.5 * (denoised[0][c] + denoised[1][c])).max(0.0));
     let brightest = mean.into_iter().fold(0.0, f32::max);
     let step = (STEP.0 * brightest).max(STEP.1 / display.exposure());
     let slope: Rgb = std::array::from_fn(|c| {
         let (mut up, mut down) = (mean, mean);
         (up[c], down[c]) = (mean[c] + step, (mean[c] - step).max(0.0));
-        (display.luma(up) - display.luma(down)) / (up[c] - down[c])
+        (of(display, up) - of(display, down)) / (up[c] - down[c])
     });
     let residual = |half: usize| {
         let along = |c: usize| slope[c] * (noisy[half][c] - denoised[half][c]);
         (along(0) + along(1) + along(2)).clamp(-MOST, MOST)
     };
-    let [shown, a, b] = [mean, denoised[0], denoised[1]].map(|pixel| display.luma(pixel));
+    let [shown, a, b] = [mean, denoised[0], denoised[1]].map(|pixel| of(display, pixel));
     // What one half alone has, and is as white in the mean as there, is seen as a whole
     let held = held([shown, a, b], [0.5; 2]);
     let (difference, dot) = (0.5 * (1.0 + held) * (a - b), held * (a - b).abs());

@@ -21,7 +21,7 @@ pub(crate) fn unmet_error(
     let sum = pixels.fold([0.0; 3], |sum, pixel| std::array::from_fn(|c| sum[c] + f64::from(pixel[c])));
     let field = display.luma(sum.map(|c| (c / tile.pixels() as f64) as f32));
     let light = light.residual.inside(light.inner).collect();
-    Some(DenoisedError::of((tile.width, tile.height), vec![field; tile.pixels()], light, display))
+    Some(DenoisedError::of((tile.width, tile.height), vec![[vec![field; tile.pixels()], light]], display))
 }
 
 /// Just-objectionable differences (JOD) that each tile of a film would lose by the light that it is likely to lack, in their

@@ -70,6 +70,28 @@ fn so_does_what_people_see_of_it() {
     }
 }
 
+/// Blue noise, and what a denoiser leaves of it, is seen as the whole metric sees it, of which greys see next to nothing.
+#[test]
+fn errors_of_one_colour_are_seen() {
+    let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
+    let whole = TileGrid::new(SIZE.0, SIZE.1, SIZE.0.max(SIZE.1)).unwrap().tile(0);
+    let blue = |pixels: &[Rgb]| -> Vec<Rgb> {
+        truth().iter().zip(pixels).map(|(truth, pixel)| [truth[0], truth[1], pixel[2]]).collect()
+    };
+    for denoiser in [Simple::Nothing, Simple::Bilateral(0.3)] {
+        let [a, b] = [41, 42].map(|seed| blue(&noisy(seed, 0.1)));
+        let [da, db] = [&a, &b].map(|half| blue(&denoiser.of(half)));
+        let halves = DenoisedHalves { size: SIZE, noisy: [&a, &b], denoised: [&da, &db] };
+        let estimated = DenoisedError::new(&halves, &Display::SRGB).unwrap();
+        let lost = estimated.jods_lost(whole, &eyes, &mut room).unwrap();
+        let shown = |pixels: &[Rgb]| pixels.iter().map(|&p| Display::SRGB.encode(p)).collect::<Vec<Rgb>>();
+        let mean: Vec<Rgb> =
+            da.iter().zip(&db).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
+        let jod = eyes.compare(&shown(&mean), &shown(&truth()), SIZE, &mut room).unwrap().jod();
+        assert!((0.7..1.3).contains(&(lost / (10.0 - jod))), "{lost} and {} JOD", 10.0 - jod);
+    }
+}
+
 /// In a film, what a denoiser leaves of the noise is new in every frame and averaged over, and what it removes of the
 /// picture stands still.
 #[test]
