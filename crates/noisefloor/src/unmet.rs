@@ -95,9 +95,9 @@ impl MetOnce {
             }
             let [a, b] = &halves;
             let own = [a.here(), b.here()];
-            for (rows, share) in own.iter().zip(of_tile.shares) {
-                met.all += share * rows.iter().map(|&light| f64::from(light)).sum::<f64>();
-            }
+            // Exchanged halves add up to the same bits
+            let sums = own.map(|row| row.iter().map(|&light| f64::from(light)).sum::<f64>());
+            met.all += of_tile.shares[0] * sums[0] + of_tile.shares[1] * sums[1];
             let around = [&a.highest[..], &b.highest];
             if film.rejected() == 0 {
                 let mut found = [0.0; AT_ONCE];
