@@ -72,8 +72,8 @@ fn start(
 }
 
 #[cfg(test)]
+#[cfg(unix)]
 mod tests {
-    #![cfg(unix)]
     use super::*;
     use crate::plan::Task;
     use std::os::unix::fs::PermissionsExt;

@@ -194,6 +194,9 @@ pub(crate) struct PyVerdict {
     open_for: Option<String>,
 }
 
+/// What a verdict is made of again, as `pickle` does.
+type VerdictArguments = (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool, Option<String>);
+
 #[pymethods]
 impl PyVerdict {
     #[new]
@@ -209,9 +212,7 @@ impl PyVerdict {
         Self { tile, converged, probability, expected_spp, threshold, unfamiliar, open_for }
     }
 
-    fn __getnewargs__(
-        &self,
-    ) -> (PyTile, bool, Option<f32>, Option<u64>, Option<Points>, bool, Option<String>) {
+    fn __getnewargs__(&self) -> VerdictArguments {
         let Self { tile, converged, probability, expected_spp, threshold, unfamiliar, open_for } =
             self.clone();
         (tile, converged, probability, expected_spp, threshold, unfamiliar, open_for)

@@ -498,14 +498,13 @@ fn judge_with_light<E: Send>(
         described[tile.index] = lit.map(|(lit, _)| lit).or(described[tile.index].take());
     }
     // Of a tile whose noise is not seen, its own light decides, or that of its neighbours
-    let worse = |((noise, light), kind): (((Verdict, bool), (Verdict, bool)), Option<OpenFor>)| match (
-        noise.1, light.1,
-    ) {
+    let verdicts = by_noise.into_iter().zip(judge(described)).zip(kinds);
+    let worse = verdicts.map(|((noise, light), kind)| match (noise.1, light.1) {
         (true, true) => light,
         (true, false) => (light.0.kept_open_by(kind.unwrap_or(OpenFor::UnmetLight)), false),
         (false, _) => noise,
-    };
-    Ok(by_noise.into_iter().zip(judge(described)).zip(kinds).map(worse).collect())
+    });
+    Ok(worse.collect())
 }
 
 /// What each tile has met once.

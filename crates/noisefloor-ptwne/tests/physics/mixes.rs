@@ -31,8 +31,10 @@ fn mixed(b: &mut SceneBuilder, [first, second]: [MaterialId; 2], share: f32) -> 
     b.mixed_material(first, second, Texture::Colour([share; 3]), MaterialOptions::default()).unwrap()
 }
 
+type Build = fn(&mut SceneBuilder) -> MaterialId;
+
 /// A mix, one in the first and one in the second part of another, and one of mixes: the share of green.
-const MIXES: [(fn(&mut SceneBuilder) -> MaterialId, f64); 5] = [
+const MIXES: [(Build, f64); 5] = [
     (
         |b| {
             let parts = red_and_green(b);

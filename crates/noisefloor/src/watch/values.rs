@@ -94,7 +94,7 @@ impl Digits {
         let bits = value.to_bits();
         let significand = bits & 0x007f_ffff | 0x0080_0000;
         let digits = 24 - significand.trailing_zeros();
-        self.which |= 1 << (significand >> significand.trailing_zeros()) % 61;
+        self.which |= 1 << ((significand >> significand.trailing_zeros()) % 61);
         let binade = (bits >> 23) as usize % 4;
         self.all[binade] += 1;
         self.take(digits);
