@@ -688,7 +688,7 @@ mod tests {
         for colour in [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]] {
             assert_eq!(in_colour(grey, colour, 0.1), [true, false], "{colour:?}");
         }
-        let [one, other] = [false, true].map(|exchanged| planes(grey, [0.0, 0.3, 1.0], 4.0, exchanged));
+        let [one, other] = [false, true].map(|exchanged| planes(grey, [0.0, 0.02, 1.0], 4.0, exchanged));
         let [one, other] = [&one[0], &other[0]].map(|planes| planes.colour.as_ref().unwrap());
         assert_eq!(one.image, other.image);
         for (one, other) in one.residual.iter().zip(&other.residual) {

@@ -298,9 +298,10 @@ impl Film {
         self.negative
     }
 
-    /// All samples taken, over all pixels.
+    /// All samples taken, over all pixels; no more than fit.
     pub fn total_samples(&self) -> u64 {
-        self.grid.tiles().map(|t| self.spp(t.index) * t.pixels() as u64).sum()
+        let of_tile = |t: Tile| self.spp(t.index).saturating_mul(t.pixels() as u64);
+        self.grid.tiles().map(of_tile).fold(0, u64::saturating_add)
     }
 
     /// Adds the mean of `spp` new samples per pixel; `mean` is row-major over the tile.

@@ -2,7 +2,7 @@ use crate::kit::{FILES, column, json, succeed, table, text, tiny};
 use noisefloor_image::{Picture, read_exr, read_picture};
 use tempfile::tempdir;
 
-const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,unfamiliar,jods_lost";
+const STOPS: &str = "tile,x,y,width,height,spp,probability,reason,open_for,unfamiliar,jods_lost";
 
 // Long: one run, looked at from all sides
 #[test]

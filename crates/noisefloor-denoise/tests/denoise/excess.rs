@@ -7,7 +7,8 @@ use noisefloor::{
 };
 use noisefloor_denoise::{DenoisedError, DenoisedQuality, jods_lost_unmet};
 
-const SPP: u64 = 10;
+/// Both have so many that what nothing has met is not looked for any more.
+const SPP: u64 = 50;
 const LIMIT: f64 = 0.3;
 
 /// Both halves, with one find of this light in a sample of the first, at the wall.
@@ -34,7 +35,7 @@ fn lacking(halves: &[Vec<Rgb>; 2]) -> Vec<usize> {
 
 #[test]
 fn two_pictures_lack_what_a_session_of_their_halves_says() {
-    for (light, held) in [(0.3, false), (60.0, false), (3e4, true), (3e5, true)] {
+    for (light, held) in [(1.5, false), (300.0, false), (1.5e5, true), (1.5e6, true)] {
         let halves = halves(light);
         let params = params().with_min_spp(2 * SPP).with_schedule(Schedule::Growing { step: SPP });
         let criterion = DenoisedQuality::new(Simple::Flat(0.3), LIMIT);
@@ -74,7 +75,7 @@ fn light_that_one_picture_has_met_keeps_a_setting_from_being_found() {
             .map(|(_, ratio)| *ratio)
             .fold(0.0, f64::max)
     };
-    let (without, with) = (worst(0.3, false), worst(3e4, false));
+    let (without, with) = (worst(1.5, false), worst(1.5e5, false));
     assert!(without < 1.0 && with > 1.0, "{without}, {with}");
-    assert_eq!(with, worst(3e4, true));
+    assert_eq!(with, worst(1.5e5, true));
 }

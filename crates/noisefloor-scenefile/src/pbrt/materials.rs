@@ -188,7 +188,8 @@ impl Reader<'_> {
                 let scale = Texture::Colour([self.number(d, "scale", 1.0)?.max(0.0) as f32; 3]);
                 let [diffuse, through] = ["reflectance", "transmittance"].map(|name| {
                     let colour = self.colour(d, name, [0.25; 3])?;
-                    self.product(&d.params, colour, scale.clone())
+                    let scaled = self.product(&d.params, colour, scale.clone())?;
+                    self.inside(&d.params.place, scaled)
                 });
                 Lobes { diffuse: diffuse?, through: through?, ..Lobes::default() }.into()
             }
