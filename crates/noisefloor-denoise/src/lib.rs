@@ -26,7 +26,8 @@
 //! }
 //!
 //! let criterion = DenoisedQuality::new(Rows, DEFAULT_JODS_LOST);
-//! let params = Params::default().with_tile(32).with_min_spp(16).with_schedule(Schedule::Growing { step: 16 });
+//! // From 100 samples on, a picture of so few pixels does not wait for light that nothing has met
+//! let params = Params::default().with_tile(32).with_min_spp(112).with_schedule(Schedule::Growing { step: 16 });
 //! let mut session = Session::new(64, 64, criterion, params)?;
 //! while !session.is_done() {
 //!     for request in session.requests() {
@@ -36,7 +37,7 @@
 //!     }
 //!     session.judge()?;
 //! }
-//! assert!(session.stops().all(|stop| stop.spp == 16));
+//! assert!(session.stops().all(|stop| stop.spp == 112));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

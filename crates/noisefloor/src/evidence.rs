@@ -63,6 +63,8 @@ const SATURATED: [f32; 2] = [3.5, 4.2];
 const UNSEEN: f32 = 1.0 / 255.0;
 /// Edge of the squares in which noise is looked at for its colour: of a window, a lone dot has a third or more.
 const SQUARE: usize = 16;
+/// Columns that squares are looked at in together.
+const TINTED: usize = 4 * SQUARE;
 
 /// Two pictures of a tile as displayed, and what they differ by. All planes are display-encoded and have the same shape
 /// (rows, columns): the tile, whose edges are rounded up to multiples of [`HALO`], with a halo of that width around
@@ -256,11 +258,9 @@ fn tint([luma, r, b]: Channels<f32>, [noise, noise_r, noise_b]: Channels<f32>) -
 
 /// Adds the [`tint`] of the pixels of a row to the sums of their columns, and the squares of it.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
-fn add_tints(image: Channels<&[f32]>, residual: Channels<&[f32]>, sums: &mut [Vec<f32>; 4]) {
-    let [coloured, grey, coloured_squares, grey_squares] = sums.each_mut().map(Vec::as_mut_slice);
-    let n = coloured.len();
-    let (grey, coloured_squares, grey_squares) =
-        (&mut grey[..n], &mut coloured_squares[..n], &mut grey_squares[..n]);
+fn add_tints(image: Channels<&[f32]>, residual: Channels<&[f32]>, sums: &mut [[f32; TINTED]; 4]) {
+    let n = image[0].len();
+    let [coloured, grey, coloured_squares, grey_squares] = sums.each_mut().map(|sums| &mut sums[..n]);
     let ([luma, r, b], [noise, noise_r, noise_b]) = (image, residual);
     let (luma, r, b) = (&luma[..n], &r[..n], &b[..n]);
     let (noise, noise_r, noise_b) = (&noise[..n], &noise_r[..n], &noise_b[..n]);
@@ -348,22 +348,24 @@ impl Shown {
     fn is_coloured(&self, tile: Tile) -> bool {
         let Region { rows, columns, .. } = &self.region;
         let (top, left) = (tile.y - rows.start, tile.x - columns.start);
-        let mut sums: [Vec<f32>; 4] = std::array::from_fn(|_| vec![0.0; tile.width]);
         let mut most = [0.0f32; 4];
         for y in (top..top + tile.height).step_by(SQUARE) {
             let bottom = (y + SQUARE).min(top + tile.height);
-            sums.iter_mut().for_each(|sums| sums.fill(0.0));
-            for row in y..bottom {
-                let here = row * columns.len() + left..row * columns.len() + left + tile.width;
-                let [image, residual] = self
-                    .planes
-                    .each_ref()
-                    .map(|channels| channels.each_ref().map(|plane| &plane[here.clone()]));
-                add_tints(image, residual, &mut sums);
-            }
-            for (most, sums) in most.iter_mut().zip(&sums) {
+            for x in (left..left + tile.width).step_by(TINTED) {
+                let right = (x + TINTED).min(left + tile.width);
+                let mut sums = [[0.0; TINTED]; 4];
+                for row in y..bottom {
+                    let here = row * columns.len() + x..row * columns.len() + right;
+                    let [image, residual] = self
+                        .planes
+                        .each_ref()
+                        .map(|channels| channels.each_ref().map(|plane| &plane[here.clone()]));
+                    add_tints(image, residual, &mut sums);
+                }
                 let mean = |square: &[f32]| square.iter().sum::<f32>() / (square.len() * (bottom - y)) as f32;
-                *most = sums.chunks(SQUARE).map(mean).fold(*most, f32::max);
+                for (most, sums) in most.iter_mut().zip(&sums) {
+                    *most = sums[..right - x].chunks(SQUARE).map(mean).fold(*most, f32::max);
+                }
             }
         }
         let [coloured, grey, coloured_squares, grey_squares] = most;

@@ -49,6 +49,9 @@ const NOTHING_MET: f64 = 0.1 * 250_000.0;
 /// Samples per pixel from which a tile is not expected to lack what nothing has met: pictures of few pixels would never end.
 const ENOUGH_SPP: u64 = 100;
 
+/// Mean light of a tile, in average greys, below which it is darkness more than surfaces.
+const DARK: f64 = 0.1;
+
 /// Exposed radiance of an average grey.
 const GREY: f32 = 0.18;
 
@@ -313,13 +316,13 @@ impl Unmet {
         if met { OpenFor::UnmetLight } else { OpenFor::FewSamples }
     }
 
-    /// Surfaces are as bright by what was met as they would be by other light: what is darker than grey shows less of it, and
-    /// empty space none.
+    /// Surfaces are as bright by what was met as they would be by other light: empty space shows none of it, and what is darker
+    /// than [`DARK`] less.
     fn nothing_met(&self, film: &Film, tile: Tile) -> f64 {
         let Some(own) = self.tiles[tile.index].filter(|_| film.spp(tile.index) < ENOUGH_SPP) else {
             return 0.0;
         };
-        let brightness = (own.all / own.pixels.max(1.0) / self.grey).min(1.0);
+        let brightness = (own.all / own.pixels.max(1.0) / (DARK * self.grey)).min(1.0);
         (self.nothing * brightness - own.density()).max(0.0)
     }
 

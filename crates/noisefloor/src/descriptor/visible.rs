@@ -250,14 +250,10 @@ impl Visible {
         let mut all: Vec<(f64, f64)> = match window {
             None => tiles.iter().zip(noises).map(of_one_sample).collect(),
             Some(window) => {
-                let zones = contrast.zones(ZONE * window, window, None);
                 // The quantile leaves out one zone of many by itself
-                let few = (zones.len() as f64) * (1.0 - self.picture_quantile) < 1.0;
+                let few = (contrast.zone_count(ZONE * window) as f64) * (1.0 - self.picture_quantile) < 1.0;
                 let place = few.then(|| contrast.worst_place(LOCAL, window, strength)).flatten();
-                let zones = match &place {
-                    Some(place) => contrast.zones(ZONE * window, window, Some(place)),
-                    None => zones,
-                };
+                let zones = contrast.zones(ZONE * window, window, place.as_ref());
                 zones.into_iter().map(|(worst, blocks)| (strength(worst), blocks as f64)).collect()
             }
         };

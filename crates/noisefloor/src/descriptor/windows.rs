@@ -184,6 +184,11 @@ impl PictureContrast {
         ((rows.len() * columns.len()) as f64 <= share * blocks).then_some((rows, columns))
     }
 
+    /// How many zones there are, of near `edge` blocks.
+    pub(super) fn zone_count(&self, edge: usize) -> usize {
+        count_of(&self.rows, edge) * count_of(&self.columns, edge)
+    }
+
     /// The worst window around a block of each of the zones that the picture divides into, with as many blocks as it has:
     /// of equal size, near `edge` blocks. Blocks of `without`, as rows and columns, do not count.
     pub(super) fn zones(
@@ -193,7 +198,7 @@ impl PictureContrast {
         without: Option<&(Range<usize>, Range<usize>)>,
     ) -> Vec<(WindowContrast, usize)> {
         let divide = |all: &Range<usize>| {
-            let count = ((all.len() as f64 / edge as f64).round() as usize).max(1);
+            let count = count_of(all, edge);
             let (start, length) = (all.start, all.len());
             (0..count).map(move |i| start + i * length / count..start + (i + 1) * length / count)
         };
@@ -244,6 +249,11 @@ fn mean([above, below]: [&[[f64; 3]]; 2], left: usize, right: usize) -> WindowCo
 /// Pixels of a block that lie within from..from + count.
 fn overlap(block: usize, from: usize, count: usize) -> usize {
     ((block + 1) * BLOCK).min(from + count) - (block * BLOCK).max(from)
+}
+
+/// Into how many parts, of near `edge` blocks each, a side is divided.
+fn count_of(side: &Range<usize>, edge: usize) -> usize {
+    ((side.len() as f64 / edge as f64).round() as usize).max(1)
 }
 
 #[cfg(test)]
