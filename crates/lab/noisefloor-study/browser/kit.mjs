@@ -15,7 +15,7 @@ export const LARGE = { width: 1920, height: 1080 };
 /** The style by which Playwright hides the caret in screenshots: in Firefox, the policy of the pages forbids it. */
 const CARET = "sha256-YjaKGiklmzC6wjXA513HAMmzus8VE61XCOT+SmwNZWA=";
 /** Time after which something on a page has failed to come, in milliseconds; long, since tests run side by side. */
-export const PATIENCE = 60000;
+const PATIENCE = 60000;
 
 /** Firefox as it is installed, driven by WebDriver BiDi, if the environment asks for it; Chromium otherwise. */
 export const FIREFOX = process.env.NOISEFLOOR_BROWSER === "firefox";
@@ -79,19 +79,9 @@ export async function openScaled(t, url, ratio) {
   return { page };
 }
 
-/** How long a frame is where time passes frame by frame, in milliseconds: as Playwright's clock has it. */
-export const FRAME = 16;
-
-/** Lets time pass on a page frame by frame, whatever the machine takes for each: none is late but by what is pushed into
- * `late`, in milliseconds. */
-async function frameByFrame(page, late) {
-  await page.clock.pauseAt(Date.now() + 1000);
-  for (;;) await (late.length > 0 ? page.clock.fastForward(late.pop()) : page.clock.runFor(FRAME));
-}
-
 /** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the
- * test; `refusals` are expected where a test asks for them. With `late`, time passes frame by frame. */
-export async function open(t, url, viewport, { refusals = false, late, ...options } = {}) {
+ * test; `refusals` are expected where a test asks for them. */
+export async function open(t, url, viewport, { refusals = false, ...options } = {}) {
   const context = await browser.newContext({ viewport, locale: "en-GB", ...options });
   const problems = [];
   context.on("request", (request) => {
@@ -106,10 +96,7 @@ export async function open(t, url, viewport, { refusals = false, late, ...option
     await context.close();
     assert.deepEqual(problems, []);
   });
-  if (late) await page.clock.install();
   await page.goto(url);
-  // Until the page is closed
-  if (late) frameByFrame(page, late).catch(() => {});
   return { context, page, problems };
 }
 
@@ -196,7 +183,7 @@ export const code = (page) =>
 export const settled = (page) =>
   page.evaluate(async () => {
     const of = localStorage.getItem(`noisefloor.code.${location.pathname}`);
-    for (let i = 0; i < 6000; i += 1) {
+    for (let i = 0; i < 500; i += 1) {
       if (JSON.parse(localStorage.getItem(`noisefloor.outbox.${of}`)).length === 0) break;
       await new Promise((go) => setTimeout(go, 10));
     }
