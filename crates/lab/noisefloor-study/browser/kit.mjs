@@ -15,7 +15,7 @@ export const LARGE = { width: 1920, height: 1080 };
 /** The style by which Playwright hides the caret in screenshots: in Firefox, the policy of the pages forbids it. */
 const CARET = "sha256-YjaKGiklmzC6wjXA513HAMmzus8VE61XCOT+SmwNZWA=";
 /** Time after which something on a page has failed to come, in milliseconds; long, since tests run side by side. */
-const PATIENCE = 60000;
+export const PATIENCE = 60000;
 
 /** Firefox as it is installed, driven by WebDriver BiDi, if the environment asks for it; Chromium otherwise. */
 export const FIREFOX = process.env.NOISEFLOOR_BROWSER === "firefox";
