@@ -367,7 +367,7 @@ class Backgrounds(unittest.TestCase):
 
         params = nf.Params(tile=32, schedule="growing", step=48, min_spp=48)
         for denoiser in (smooth, broken):
-            session = nf.Session(96, 80, params=params, denoiser=denoiser)
+            session = nf.Session(96, 80, params=params, denoiser=denoiser, linear=True)
             background = nf.Background(session)
             for image in self.passes(8):
                 if denoiser is broken:
@@ -649,8 +649,9 @@ class Denoised(unittest.TestCase):
             converged = all(reason == "converged" for _, reason in stops[denoiser])
             self.assertEqual(converged, bool((lost <= 0.3).all()), denoiser)
             self.assertIsNone(session.visible_noise())
-        # Noise that both halves have in common by chance passes for a bias of even the perfect picture
-        self.assertTrue(all(a <= b for (a, _), (b, _) in zip(stops[perfect], stops[smooth])), stops)
+        # Noise that both halves have in common by chance passes for a bias of even the perfect picture; all wait for light that
+        # nothing has met until 100 samples, after which tiles may end in another order
+        self.assertLessEqual(sum(spp for spp, _ in stops[perfect]), sum(spp for spp, _ in stops[smooth]), stops)
         # Nine by nine pixels have a ninth of the noise
         self.assertLess(max(spp for spp, _ in stops[smooth]), min(spp for spp, _ in stops[identity]))
         # A picture that is wrong by itself gets no better
