@@ -15,7 +15,7 @@
 //! counts, a gamma distribution): where finds are many, a place that has none lacks one at the most, and a
 //! single one may lie anywhere.
 //!
-//! Where nothing was met once, nothing tells of what was missed. As much as [`NOTHING_MET`] is expected all the same, spread
+//! Where nothing was met once, nothing tells of what was missed. As much as `NOTHING_MET` is expected all the same, spread
 //! over all samples of the picture; a tile that has met light of that order needs none.
 //!
 //! Whether so much light would be seen if it fell on a tile is for the criterion to say: [`Unmet::shown`]
