@@ -62,7 +62,7 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 /// Counts are drawn together: a tile that is satisfied goes on being sampled, a little, and is judged again, while others need
 /// far more. For the same promise, this takes about as many samples, and leaves less in the mean (`docs/benchmarks/denoised.md`).
 ///
-/// A tile stays open as long as it is likely to lack light that few samples have met ([`Verdict::unmet`]), and that would by itself
+/// A tile stays open as long as it is likely to lack light that few samples have met ([`Verdict::open_for`]), and that would by itself
 /// lose more than the limit where it fell on a plain field as bright as the tile: a denoiser takes lone finds for noise, and removes
 /// them. What is found later opens tiles again that had stopped.
 ///
