@@ -7,8 +7,9 @@ for docs/benchmarks/blender.md.
 
 `render` writes what Blender shows (view transform included) as PNGs of 16 bits, denoised by Cycles' own Open Image
 Denoise, two seeds a setting unless said otherwise, beside times.json with the processor seconds of each render and of the search,
-or the wall seconds if DEVICE is OPTIX, CUDA, HIP, ONEAPI or METAL, which then denoises, too; it goes on where it was interrupted. `measure` says what the worst square of 64 pixels, side by side, has lost against the reference, by the package
-`cvvdp`, no code of this project: on average over two seeds, and of the worse one."""
+or the wall seconds if DEVICE is OPTIX, CUDA, HIP, ONEAPI or METAL, which then denoises, too; it goes on where it was interrupted. `measure`
+says what the worst square of 64 pixels, side by side, has lost against the reference, by the package `cvvdp`, no code of this project: on
+average over two seeds, and of the worse one."""
 import json
 import pathlib
 import resource
@@ -108,6 +109,13 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
     some(SAMPLES, 1)
 
 
+def label(name):
+    """The ledger's name of a row: `threshold-0.01-1` and the like."""
+    kind, value, _ = name.split("-")
+    named = {"loop": "the loop", "tuned": "the threshold found", "samples": f"{value} samples", "threshold": f"threshold {value}"}[kind]
+    return named + (", Cycles' default" if (kind, value) == ("threshold", "0.01") else "")
+
+
 def measure(folders):
     import numpy
     import pycvvdp
@@ -121,22 +129,25 @@ def measure(folders):
     def places(side):
         return [*range(0, max(side - 64, 0), 64), max(side - 64, 0)]
 
+    rows, heads, table = {}, [], "blender"
     for folder in map(pathlib.Path, folders):
         done = json.loads((folder / "times.json").read_text())
+        table = "blender" if done["device"] == "CPU" else "blender-gpu"
         reference = read(next(folder.glob("samples-*-77.png")))
-        print(f"\n{folder.name}: search {done['search']}\n| setting | seconds | JOD lost, mean of two seeds | worse |\n|---|---|---|---|")
+        print(f"{folder.name}: {done['search']}", file=sys.stderr)
+        heads += [f"{folder.name}: seconds", f"{folder.name}: JOD lost"]
         for name in [name[:-2] for name in done if name.endswith("-1")]:
             lost = []
-            for seed in (1, 2):
-                path = folder / f"{name}-{seed}.png"
-                if path.exists():
-                    picture = read(path)
-                    squares = [(slice(y, y + 64), slice(x, x + 64)) for y in places(picture.shape[0]) for x in places(picture.shape[1])]
-                    lost.append(max(10 - float(metric.predict(picture[s], reference[s], dim_order="HWC")[0]) for s in squares))
-            if not lost:
-                continue
-            seconds = numpy.mean([done[f"{name}-{seed}"]["user"] for seed in (1, 2) if f"{name}-{seed}" in done])
-            print(f"| {name} | {seconds:.1f} | {numpy.mean(lost):.2f} | {max(lost):.2f} |", flush=True)
+            for path in sorted(folder.glob(f"{name}-[12].png")):
+                picture = read(path)
+                squares = [(slice(y, y + 64), slice(x, x + 64)) for y in places(picture.shape[0]) for x in places(picture.shape[1])]
+                lost.append(max(10 - float(metric.predict(picture[s], reference[s], dim_order="HWC")[0]) for s in squares))
+            row = rows.setdefault(label(name + "-1"), {})
+            row[heads[-2]] = f"{numpy.mean([done[each]['user'] for each in done if each[:-2] == name]):.3g}"
+            row[heads[-1]] = f"{numpy.mean(lost):.2f}" + (f" ({max(lost):.2f})" if len(lost) > 1 else "")
+    print(f"### {table}\n| | " + " | ".join(heads) + " |\n" + "|---" * (len(heads) + 1) + "|")
+    for name, row in rows.items():
+        print(f"| {name} | " + " | ".join(row.get(head, "") for head in heads) + " |")
 
 
 if __name__ == "__main__":

@@ -197,10 +197,8 @@ pub struct Excess {
     pub place: Option<(usize, usize)>,
     /// A number computed from the pictures, equal for equal pictures; 0 if unknown.
     pub pictures: u64,
-    /// The ratio expected of *one* picture whose threshold is finer by √2. Where noise follows the threshold, that picture is as
-    /// good as the mean of two, and this is `ratio`; where every pixel has the fewest samples that the renderer takes, it is √2
-    /// times `ratio`, unless the two had half of these each. `None` if it is unknown how samples follow the threshold: then only
-    /// rendered pictures count.
+    /// How far a single picture, rendered with the threshold divided by √2, would be from the limit: `ratio` where noise follows
+    /// the threshold, up to √2 times as much where pixels have the fewest samples. `None`: unknown.
     pub alone: Option<f64>,
     /// The ratio below which no finer threshold gets, since the pixels that make it have the most samples that the renderer
     /// takes; 0 if unknown.
