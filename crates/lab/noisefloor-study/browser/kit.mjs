@@ -79,9 +79,19 @@ export async function openScaled(t, url, ratio) {
   return { page };
 }
 
+/** In a page: notes its frames, in the order in which the browser draws them, as [their time, when they were drawn]. */
+const note = () => {
+  globalThis.drawn = [];
+  const next = (time) => {
+    globalThis.drawn.push([time, performance.now()]);
+    requestAnimationFrame(next);
+  };
+  requestAnimationFrame(next);
+};
+
 /** A window of its own. Requests to any other machine, and anything written to the console as an error, fail the
- * test; `refusals` are expected where a test asks for them. */
-export async function open(t, url, viewport, { refusals = false, ...options } = {}) {
+ * test; `refusals` are expected where a test asks for them. Its frames are noted if `frames` says so. */
+export async function open(t, url, viewport, { refusals = false, frames = false, ...options } = {}) {
   const context = await browser.newContext({ viewport, locale: "en-GB", ...options });
   const problems = [];
   context.on("request", (request) => {
@@ -96,6 +106,7 @@ export async function open(t, url, viewport, { refusals = false, ...options } = 
     await context.close();
     assert.deepEqual(problems, []);
   });
+  if (frames) await page.addInitScript(note);
   await page.goto(url);
   return { context, page, problems };
 }
@@ -181,14 +192,17 @@ export const code = (page) =>
 
 /** The session as the server has it, once nothing is under way. */
 export const settled = (page) =>
-  page.evaluate(async () => {
+  page.evaluate(async (patience) => {
     const of = localStorage.getItem(`noisefloor.code.${location.pathname}`);
-    for (let i = 0; i < 500; i += 1) {
+    for (const end = Date.now() + patience; Date.now() < end; ) {
       if (JSON.parse(localStorage.getItem(`noisefloor.outbox.${of}`)).length === 0) break;
       await new Promise((go) => setTimeout(go, 10));
     }
     return (await fetch(`api/sessions/${of}`)).json();
-  });
+  }, PATIENCE);
+
+/** The frames of a window that notes them. */
+export const noted = (page) => page.evaluate(() => globalThis.drawn);
 
 /** Waits until answers count: what comes sooner is not taken. */
 export const look = (page) =>

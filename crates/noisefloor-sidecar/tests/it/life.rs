@@ -20,7 +20,9 @@ pub(crate) fn gone_within(pid: u32, limit: Duration) -> bool {
 fn no_process_outlives_its_source() {
     for how in ["work", "ignore the end", "hang", "close standard output", "die"] {
         let Some(mut fake) = Fake::new(how) else { return };
-        fake.job.timeout = Duration::from_secs(2);
+        if how == "hang" {
+            fake.job.timeout = Duration::from_secs(3);
+        }
         let mut source = fake.open().unwrap();
         assert!(is_running(fake.pids()[0]));
         source.sample(&requests(0, 1)).unwrap();
@@ -38,7 +40,9 @@ fn no_child_of_a_renderer_outlives_its_source() {
     for how in ["work", "hang", "die", "ignore the end"] {
         let Some(mut fake) = Fake::new(how) else { return };
         fake.options.insert("fork".to_owned(), "yes".to_owned());
-        fake.job.timeout = Duration::from_secs(2);
+        if how == "hang" {
+            fake.job.timeout = Duration::from_secs(3);
+        }
         let mut source = fake.open().unwrap();
         let _ = source.sample(&requests(1, 1));
         let pids = two_pids(&fake.folder.path().join("pids"));
