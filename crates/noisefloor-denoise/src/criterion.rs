@@ -4,8 +4,8 @@ use crate::denoiser::{DenoiseError, Denoiser, NoisyPicture, cut};
 use crate::estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY, PartError};
 use crate::guides::Guides;
 use crate::mirrored::DenoisePasses;
-use crate::parts::{holds, parts_around, whole, within};
-use crate::record::{DenoisedRecord, Done};
+use crate::parts::{holds, parts_around, within};
+use crate::record::{Done, Record};
 use crate::unmet::unmet_error;
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
@@ -17,8 +17,7 @@ use noisefloor::{
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 use std::error::Error;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::sync::Arc;
 
 /// What stands before and after the limit in the criterion's name.
 const AT_MOST: &str = "at most ";
@@ -78,9 +77,7 @@ pub struct DenoisedQuality<D> {
     lost: f64,
     guides: Option<Arc<Guides>>,
     passes: DenoisePasses,
-    record: Arc<Mutex<DenoisedRecord>>,
-    /// Tiles that satisfied the last verdict on them, by index.
-    done: Vec<Option<Done>>,
+    record: Record,
     /// Verdicts that were not asked for, until they are fetched.
     revised: Vec<(Tile, Verdict)>,
 }
@@ -90,7 +87,7 @@ impl<D: Denoiser> DenoisedQuality<D> {
     /// are held to it with a margin, [`stops_err_by`].
     pub fn new(denoiser: D, lost: f64) -> Self {
         let (guides, passes) = (None, DenoisePasses::One);
-        Self { denoiser, lost, guides, passes, record: Arc::default(), done: Vec::new(), revised: Vec::new() }
+        Self { denoiser, lost, guides, passes, record: Record::default(), revised: Vec::new() }
     }
 
     /// Helps the denoiser with albedo and normals.
@@ -104,11 +101,6 @@ impl<D: Denoiser> DenoisedQuality<D> {
     #[must_use]
     pub fn shown_as_mean_of(self, passes: DenoisePasses) -> Self {
         Self { passes, ..self }
-    }
-
-    /// What verdicts have looked at and have cost: updated by each of them.
-    pub fn record(&self) -> Arc<Mutex<DenoisedRecord>> {
-        Arc::clone(&self.record)
     }
 
     /// The error in each of these rectangles of the picture.
@@ -145,12 +137,13 @@ impl<D: Denoiser> DenoisedQuality<D> {
     fn together(&self, film: &Film) -> Vec<Option<u64>> {
         let has = |tile: usize| film.spp(tile) as f64;
         let needs: Vec<f64> = self
+            .record
             .done
             .iter()
             .enumerate()
             .map(|(tile, done)| done.map_or(has(tile), |done| done.spp as f64))
             .collect();
-        let wanted = drawn_together(&needs).into_iter().zip(&self.done).enumerate();
+        let wanted = drawn_together(&needs).into_iter().zip(&self.record.done).enumerate();
         wanted
             .map(|(tile, (wanted, done))| {
                 let more = done.is_some() && wanted >= TOGETHER_STEP * has(tile);
@@ -227,7 +220,7 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
     }
 
     fn begin(&mut self, grid: TileGrid) {
-        self.done = vec![None; grid.len()];
+        self.record = Record::new(grid);
         self.revised.clear();
     }
 
@@ -240,17 +233,12 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             let why = format!("a tile may lose a positive number of JODs, not {}", self.lost);
             return Err(CriterionError::Failed { name: self.name(), why });
         }
-        let began = Instant::now();
         let grid = view.film.grid();
-        if self.done.len() != grid.len() {
+        if self.record.done.len() != grid.len() {
             self.begin(grid);
         }
-        let all = whole(view.film.grid().size());
         let parts = parts_around(tiles, view.film.grid().size());
         let errors = self.estimate(view, &parts)?;
-        // Reports are of the whole picture, at which a render that was resumed may not look again
-        let unknown = self.record.lock().unwrap_or_else(PoisonError::into_inner).error.is_none();
-        let all_errors = if unknown && parts != [all] { self.estimate(view, &[all])? } else { Vec::new() };
         let eyes = VisionModel::new(&view.viewing);
         // An exposure that is estimated adds to what estimates err by, which 19 of 20 do by 1.645 deviations at most; what is
         // seen grows with it, at most
@@ -272,9 +260,10 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             .expect("each tile is in a part");
 
         // Of tiles that were done, what has been found elsewhere since can say that they lack it
-        let before: Vec<Option<Done>> = tiles.iter().map(|tile| self.done[tile.index].take()).collect();
+        let before: Vec<Option<Done>> =
+            tiles.iter().map(|tile| self.record.done[tile.index].take()).collect();
         let earlier: Vec<(Tile, Done)> =
-            grid.tiles().filter_map(|tile| Some((tile, self.done[tile.index]?))).collect();
+            grid.tiles().filter_map(|tile| Some((tile, self.record.done[tile.index]?))).collect();
         self.revised = earlier
             .par_iter()
             .map_init(VisionWorkspace::default, |room, &(tile, done)| {
@@ -284,11 +273,11 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             })
             .flatten()
             .collect();
-        self.revised.iter().for_each(|(tile, _)| self.done[tile.index] = None);
+        self.revised.iter().for_each(|(tile, _)| self.record.done[tile.index] = None);
         for ((tile, verdict), before) in tiles.iter().zip(&verdicts).zip(before) {
             let (lost, undenoised) = (verdict.lost.unwrap_or_default(), verdict.undenoised);
             let spp = before.map_or(view.film.spp(tile.index), |before| before.spp);
-            self.done[tile.index] = verdict.converged.then_some(Done { lost, undenoised, spp });
+            self.record.done[tile.index] = verdict.converged.then_some(Done { lost, undenoised, spp });
         }
         // Who is satisfied goes on beside those that are not
         let together = self.together(view.film);
@@ -301,14 +290,10 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         tiles.iter().for_each(|tile| asked[tile.index] = true);
         let others = grid.tiles().filter(|tile| !asked[tile.index]);
         self.revised.extend(others.filter_map(|tile| {
-            let (spp, done) = (together[tile.index]?, self.done[tile.index]?);
+            let (spp, done) = (together[tile.index]?, self.record.done[tile.index]?);
             Some((tile, Verdict::new(false).with_loss(done.lost, done.undenoised).expecting(Some(spp))))
         }));
-
-        let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
-        all_errors.into_iter().chain(errors).for_each(|error| record.renew(error, tiles));
-        record.seconds += began.elapsed().as_secs_f64();
-        record.verdicts += 1;
+        self.record.renew(grid.width(), &errors, tiles, &eyes);
         Ok(verdicts)
     }
 
@@ -316,22 +301,17 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         std::mem::take(&mut self.revised)
     }
 
-    /// Verdicts follow from film and display alone; what is kept is which tiles are done, and what reports say.
+    fn map_of_jods_lost(&self) -> Option<&[f32]> {
+        Some(&self.record.map)
+    }
+
+    /// Verdicts follow from film and display alone; what is kept is which tiles are done, and the map of what is left.
     fn state(&self) -> Option<Vec<u8>> {
-        let mut bytes = self.record.lock().unwrap_or_else(PoisonError::into_inner).to_bytes();
-        self.done.iter().for_each(|&done| bytes.extend(Done::to_bytes(done)));
-        Some(bytes)
+        Some(self.record.to_bytes())
     }
 
     fn restore(&mut self, grid: TileGrid, state: &[u8]) -> bool {
-        let Some((record, tiles)) = DenoisedRecord::from_bytes(state) else { return false };
-        let Some(done) = Done::all_from_bytes(tiles) else { return false };
-        if ![0, grid.len()].contains(&done.len()) {
-            return false;
-        }
-        *self.record.lock().unwrap_or_else(PoisonError::into_inner) = record;
-        self.done = done;
-        true
+        Record::from_bytes(grid, state).map(|record| self.record = record).is_some()
     }
 }
 

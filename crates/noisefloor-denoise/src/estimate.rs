@@ -29,7 +29,7 @@
 use crate::bands::{LocalMeans, Plane};
 use crate::brightness::{Light, jods_of_edge, shift};
 use crate::denoiser::{DenoiseError, cut};
-use crate::parts::{whole, within};
+use crate::parts::whole;
 use crate::thin::thin_bias;
 use noisefloor::{
     Rgb, Tile, Viewing,
@@ -87,12 +87,6 @@ struct Field {
     residual: Vec<f32>,
     /// What of the residual is the same in every frame of a film; empty for none.
     standing: Vec<f32>,
-}
-
-impl Field {
-    fn planes(&mut self) -> [&mut Vec<f32>; 3] {
-        [&mut self.shown, &mut self.residual, &mut self.standing]
-    }
 }
 
 /// What a display makes of radiance in one channel.
@@ -264,27 +258,6 @@ impl DenoisedError {
             fields: self.fields.iter().map(part).collect(),
             light: cut(&self.light, width, tile),
             display: self.display.clone(),
-        }
-    }
-
-    /// Takes over what a newer estimate, of the rectangle `part`, says of `tile` in it.
-    pub(crate) fn renew(&mut self, tile: Tile, newer: &Self, part: Tile) {
-        // What has no colour has that of greys
-        let channels = self.fields.len().max(newer.fields.len());
-        let first = self.fields[0].clone();
-        self.fields.resize(channels, first);
-        for (n, field) in self.fields.iter_mut().enumerate() {
-            let mut newer = newer.fields.get(n).unwrap_or(&newer.fields[0]).clone();
-            let (own, from) = (tile.rows(self.size.0), within(tile, part).rows(part.width));
-            for (own, from) in own.zip(from) {
-                for (plane, newer) in field.planes().into_iter().zip(newer.planes()) {
-                    plane[own.clone()].copy_from_slice(&newer[from.clone()]);
-                }
-            }
-        }
-        let (own, from) = (tile.rows(self.size.0), within(tile, part).rows(part.width));
-        for (own, from) in own.zip(from) {
-            self.light[own].copy_from_slice(&newer.light[from]);
         }
     }
 

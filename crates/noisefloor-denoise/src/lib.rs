@@ -65,5 +65,5 @@ pub use guides::{GuideError, Guides};
 pub use mirrored::{DenoisePasses, MirrorMean};
 #[cfg(feature = "oidn")]
 pub use oidn::{OIDN, Oidn};
-pub use record::{DenoisedRecord, compose};
+pub use record::compose;
 pub use unmet::jods_lost_unmet;

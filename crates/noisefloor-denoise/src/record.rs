@@ -1,18 +1,18 @@
-//! What is known of denoised pictures besides the verdicts on them.
+//! What is kept of the verdicts on denoised pictures.
 
-use crate::estimate::{DenoisedError, PartError};
-use crate::parts::holds;
-use noisefloor::{Rgb, Session, StoppingCriterion, Tile};
+use crate::estimate::PartError;
+use crate::parts::{holds, within};
+use noisefloor::{Rgb, Session, StoppingCriterion, Tile, TileGrid};
+use noisefloor_vision::VisionModel;
+use rayon::prelude::*;
 
-/// What verdicts have looked at and have cost, for reports.
-#[derive(Clone, Debug, Default)]
-pub struct DenoisedRecord {
-    /// The error of the denoised picture when each tile was last judged.
-    pub error: Option<DenoisedError>,
-    /// Seconds spent on denoising and on the estimates from it.
-    pub seconds: f64,
-    /// Verdicts so far: each takes two denoisings.
-    pub verdicts: usize,
+/// What is kept from one verdict to the next.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Record {
+    /// Tiles that satisfied the last verdict on them, by index.
+    pub done: Vec<Option<Done>>,
+    /// Just-objectionable differences (JOD) lost at each pixel when its tile was last judged, row-major; NaN where none was.
+    pub map: Vec<f32>,
 }
 
 /// A tile that satisfied its last verdict.
@@ -26,13 +26,16 @@ pub(crate) struct Done {
     pub spp: u64,
 }
 
+/// Bytes of what is kept of a tile.
+const DONE_BYTES: usize = 17;
+
 impl Done {
     /// A byte, 0 for an open tile, 1 for one that is done, 2 for one that is done as rendered; and eight each for what it has
     /// lost and its samples, little-endian.
-    pub(crate) fn to_bytes(done: Option<Self>) -> [u8; 17] {
+    pub(crate) fn to_bytes(done: Option<Self>) -> [u8; DONE_BYTES] {
         let kind = done.map_or(0, |done| 1 + u8::from(done.undenoised));
         let (lost, spp) = done.map_or((0.0, 0), |done| (done.lost, done.spp));
-        let mut bytes = [kind; 17];
+        let mut bytes = [kind; DONE_BYTES];
         bytes[1..9].copy_from_slice(&lost.to_le_bytes());
         bytes[9..].copy_from_slice(&spp.to_le_bytes());
         bytes
@@ -40,8 +43,8 @@ impl Done {
 
     /// What [`Done::to_bytes`] returned, for each tile; `None` if it did not.
     pub(crate) fn all_from_bytes(bytes: &[u8]) -> Option<Vec<Option<Self>>> {
-        let (tiles, rest) = bytes.as_chunks::<17>();
-        let tile = |bytes: &[u8; 17]| {
+        let (tiles, rest) = bytes.as_chunks::<DONE_BYTES>();
+        let tile = |bytes: &[u8; DONE_BYTES]| {
             let (&kind, rest) = bytes.split_first()?;
             let (&lost, spp) = rest.split_first_chunk::<8>()?;
             let (lost, spp) = (f64::from_le_bytes(lost), u64::from_le_bytes(spp.try_into().ok()?));
@@ -67,31 +70,39 @@ pub fn compose<C: StoppingCriterion>(session: &Session<C>, rendered: &[Rgb], den
     }
 }
 
-impl DenoisedRecord {
-    /// Takes over what is known of a rectangle of the picture, where these tiles are.
-    pub(crate) fn renew(&mut self, (part, newer): PartError, tiles: &[Tile]) {
-        match &mut self.error {
-            Some(error) if error.size() != newer.size() => {
-                let judged = tiles.iter().filter(|&&tile| holds(part, tile));
-                judged.for_each(|&tile| error.renew(tile, &newer, part));
+impl Record {
+    /// Of a picture that nothing is known of.
+    pub(crate) fn new(grid: TileGrid) -> Self {
+        Self { done: vec![None; grid.len()], map: vec![f32::NAN; grid.width() * grid.height()] }
+    }
+
+    /// Maps what is wrong with these tiles, each of which is in one of the parts.
+    pub(crate) fn renew(&mut self, width: usize, parts: &[PartError], tiles: &[Tile], eyes: &VisionModel) {
+        // A part that is too large to be compared stays as it was
+        let mapped: Vec<_> = parts.par_iter().map(|(_, error)| error.map_of_jods_lost(eyes)).collect();
+        for (&(part, _), map) in parts.iter().zip(mapped).filter_map(|(part, map)| Some((part, map.ok()?))) {
+            for &tile in tiles.iter().filter(|&&tile| holds(part, tile)) {
+                for (to, from) in tile.rows(width).zip(within(tile, part).rows(part.width)) {
+                    self.map[to].copy_from_slice(&map[from]);
+                }
             }
-            error => *error = Some(newer),
         }
     }
 
-    /// Everything but the error picture: the number of verdicts, then the seconds, in eight bytes each, little-endian.
+    /// Each tile as [`Done::to_bytes`], then the map, four bytes a pixel, little-endian.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
-        [(self.verdicts as u64).to_le_bytes(), self.seconds.to_le_bytes()].concat()
+        let tiles = self.done.iter().flat_map(|&done| Done::to_bytes(done));
+        tiles.chain(self.map.iter().flat_map(|lost| lost.to_le_bytes())).collect()
     }
 
-    /// What [`DenoisedRecord::to_bytes`] returned, and the bytes after it; `None` if it did not.
-    pub(crate) fn from_bytes(bytes: &[u8]) -> Option<(Self, &[u8])> {
-        let (&verdicts, rest) = bytes.split_first_chunk::<8>()?;
-        let (&seconds, rest) = rest.split_first_chunk::<8>()?;
-        let seconds = f64::from_le_bytes(seconds);
-        let verdicts = usize::try_from(u64::from_le_bytes(verdicts)).ok()?;
-        let sound = seconds >= 0.0 && seconds.is_finite();
-        sound.then_some((Self { error: None, seconds, verdicts }, rest))
+    /// What [`Record::to_bytes`] returned for these tiles; `None` if it did not.
+    pub(crate) fn from_bytes(grid: TileGrid, bytes: &[u8]) -> Option<Self> {
+        let (tiles, map) = bytes.split_at_checked(DONE_BYTES * grid.len())?;
+        let done = Done::all_from_bytes(tiles)?;
+        let (map, rest) = map.as_chunks::<4>();
+        let map: Vec<f32> = map.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
+        let sound = rest.is_empty() && map.len() == grid.width() * grid.height();
+        (sound && map.iter().all(|lost| lost.is_nan() || lost.is_finite())).then_some(Self { done, map })
     }
 }
 
@@ -101,15 +112,18 @@ mod tests {
 
     #[test]
     fn what_is_kept_is_restored_and_nothing_else_is() {
-        let bytes = DenoisedRecord { seconds: 1.5, verdicts: 3, error: None }.to_bytes();
-        let (again, rest) = DenoisedRecord::from_bytes(&bytes).unwrap();
-        assert_eq!((again.seconds, again.verdicts, rest.len()), (1.5, 3, 0));
-        for length in 0..bytes.len() {
-            assert!(DenoisedRecord::from_bytes(&bytes[..length]).is_none(), "{length}");
-        }
+        let grid = TileGrid::new(40, 20, 16).unwrap();
+        let mut record = Record::new(grid);
+        (record.done[1], record.map[7]) = (Some(Done { lost: 0.1, undenoised: false, spp: 48 }), 0.25);
+        let bytes = record.to_bytes();
+        let again = Record::from_bytes(grid, &bytes).unwrap();
+        // Pixels that nothing is known of are NaN, which equals nothing
+        assert_eq!((&again.done, again.to_bytes()), (&record.done, bytes.clone()));
+        assert!(again.map[7] == 0.25 && again.map[8].is_nan());
+        assert!((0..bytes.len()).all(|length| Record::from_bytes(grid, &bytes[..length]).is_none()));
         let mut odd = bytes;
-        odd[8..16].copy_from_slice(&f64::NAN.to_le_bytes());
-        assert!(DenoisedRecord::from_bytes(&odd).is_none());
+        odd.splice(DONE_BYTES * grid.len()..DONE_BYTES * grid.len() + 4, f32::INFINITY.to_le_bytes());
+        assert!(Record::from_bytes(grid, &odd).is_none());
     }
 
     #[test]

@@ -14,12 +14,12 @@ use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 15;
+const VERSION: u32 = 16;
 
 /// A snapshot of a session, for resuming it: samples, verdicts, the display, and what was noticed of the
 /// samples. Made by [`Session::checkpoint`](crate::Session::checkpoint), resumed by
 /// [`Session::resume`](crate::Session::resume) and [`Driver::resume`](crate::Driver::resume). Its file has 18
-/// bytes per pixel for each half that is kept; writing it takes next to no memory.
+/// bytes per pixel for each half that is kept, and what the criterion keeps; writing it takes next to no more memory.
 #[derive(Clone, Debug)]
 pub struct Checkpoint<'a> {
     pub(crate) job: Cow<'a, str>,

@@ -363,6 +363,12 @@ pub trait StoppingCriterion {
         None
     }
 
+    /// Just-objectionable differences (JOD) that what is to be shown has lost at each pixel of the image, row-major, by the last
+    /// verdict on its tile; NaN where there was none. `None`, the default, if the criterion judges the samples themselves.
+    fn map_of_jods_lost(&self) -> Option<&[f32]> {
+        None
+    }
+
     /// The share of people who see no noise *anywhere* in a picture, from the last [`Verdict::probability`] of each
     /// tile and its pixels. `None`, the default, if the criterion knows nothing of people.
     fn share_in_picture(&self, _viewing: Viewing, _tiles: &[(f32, usize)]) -> Option<f64> {

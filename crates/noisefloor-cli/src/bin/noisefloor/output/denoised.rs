@@ -2,29 +2,25 @@
 //! of them.
 
 use super::Output;
-use noisefloor::{Rgb, Session, source::FirstHits};
-use noisefloor_cli::say::{NotSaid, note, say};
-use noisefloor_denoise::{
-    DenoisedRecord, Denoiser, Guides, NoisyPicture, compose, spp_without_denoising, stops_err_by,
-};
+use noisefloor::{Rgb, Session, StoppingCriterion, source::FirstHits};
+use noisefloor_cli::say::{NotSaid, say};
+use noisefloor_denoise::{Denoiser, Guides, NoisyPicture, compose, spp_without_denoising, stops_err_by};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
-use noisefloor_vision::VisionModel;
 use serde::Serialize;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Samples of a picture from which light that is seldom met is hardly ever missed: the chance to have met nothing of light that
 /// one in 250,000 finds is then 2·10⁻⁴.
 const MANY: u64 = 1 << 21;
 
-/// The denoiser of a render, and what its verdicts looked at.
+/// The denoiser of a render.
 pub struct Denoised {
     denoiser: Box<dyn Denoiser>,
     /// Albedo and normals of both halves together, and whether they are clean.
     guide: Option<(FirstHits, bool)>,
-    record: Arc<Mutex<DenoisedRecord>>,
     give_up: Arc<AtomicBool>,
     /// JODs that a tile may lose.
     lost: f64,
@@ -40,9 +36,6 @@ pub(super) struct DenoisedReport {
     /// Whether the source gave it albedo and normals, and whether these are clean.
     guided: bool,
     clean: bool,
-    /// Verdicts, each of two denoisings, and the seconds that they took.
-    verdicts: usize,
-    seconds: f64,
     /// Seconds for the picture itself.
     picture_seconds: f64,
     /// Just-objectionable differences lost, by the estimate when a tile was last judged: the most of any
@@ -60,20 +53,11 @@ impl Denoised {
     pub fn new(
         denoiser: impl Denoiser + 'static,
         guides: Option<&Guides>,
-        record: Arc<Mutex<DenoisedRecord>>,
         give_up: Arc<AtomicBool>,
         lost: f64,
     ) -> Self {
         let guide = guides.map(|guides| (guides.together(), guides.is_clean()));
-        Self {
-            denoiser: Box::new(denoiser),
-            guide,
-            record,
-            give_up,
-            lost,
-            spp_without: None,
-            picture_seconds: 0.0,
-        }
+        Self { denoiser: Box::new(denoiser), guide, give_up, lost, spp_without: None, picture_seconds: 0.0 }
     }
 
     /// Set by whoever wants the denoiser to give up.
@@ -85,20 +69,13 @@ impl Denoised {
         self.give_up.load(Ordering::Relaxed)
     }
 
-    fn record(&self) -> MutexGuard<'_, DenoisedRecord> {
-        self.record.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     pub(super) fn report(&self, session: &Session) -> DenoisedReport {
-        let record = self.record();
         let verdicts = || (0..session.film().grid().len()).filter_map(|tile| session.verdict(tile));
         let lost = verdicts().filter_map(|verdict| verdict.lost).filter(|lost| lost.is_finite());
         DenoisedReport {
             denoiser: self.denoiser.name(),
             guided: self.guide.is_some(),
             clean: self.guide.as_ref().is_some_and(|(_, clean)| *clean),
-            verdicts: record.verdicts,
-            seconds: record.seconds,
             picture_seconds: self.picture_seconds,
             jods_lost: lost.max_by(f64::total_cmp),
             undenoised_tiles: verdicts().filter(|verdict| verdict.undenoised).count(),
@@ -137,8 +114,6 @@ impl Output {
         denoised.spp_without =
             spp_without_denoising(session.film(), &display, &image, viewing, denoised.lost);
         denoised.picture_seconds = began.elapsed().as_secs_f64();
-        let eyes = VisionModel::new(&viewing);
-        let map = denoised.record().error.as_ref().map(|error| error.map_of_jods_lost(&eyes)).transpose()?;
         write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
         if let Some((guide, _)) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
             write_exr(self.path("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
@@ -146,11 +121,8 @@ impl Output {
         }
         let shown = Canvas::of_picture(width, &encoded);
         shown.save(self.path("image-denoised.png"))?;
-        match map {
-            Some(map) => draw_field(&shown, &map, &ERROR_SCALE).save(self.path("denoised-error.png"))?,
-            None => note!(
-                "note: no tile was judged in this run, so the error of the denoised picture is not known"
-            ),
+        if let Some(map) = session.criterion().map_of_jods_lost() {
+            draw_field(&shown, map, &ERROR_SCALE).save(self.path("denoised-error.png"))?;
         }
         Ok(())
     }
@@ -162,8 +134,6 @@ impl Output {
             denoiser,
             guided,
             clean,
-            verdicts,
-            seconds,
             picture_seconds,
             jods_lost,
             undenoised_tiles,
@@ -201,8 +171,6 @@ impl Output {
                  nobody has been asked about denoised tiles"
             )?;
         }
-        say!(
-            "{verdicts} verdicts on denoised halves took {seconds:.1} s, the picture itself {picture_seconds:.1} s"
-        )
+        say!("to denoise the picture itself took {picture_seconds:.1} s")
     }
 }

@@ -35,7 +35,7 @@ pub(super) fn begin(
         criterion = criterion.guided_by(Arc::clone(guides));
     }
     let finished = MirrorMean::new(denoiser, passes);
-    let denoised = Denoised::new(finished, guides.as_deref(), criterion.record(), give_up, lost);
+    let denoised = Denoised::new(finished, guides.as_deref(), give_up, lost);
     Ok((Box::new(criterion), denoised))
 }
 
