@@ -26,7 +26,8 @@ impl SnapshotPair<'_> {
     /// - Neighbours: the correlation of the displayed difference with itself one pixel beside or below, within blocks and
     ///   without their means, which a picture of few samples has below the mean.
     /// - Brightness: the mean radiance and the median of blocks both differ, in one direction; a few bright pixels make the
-    ///   one, and noise of many dark ones the other.
+    ///   one, and noise of many dark ones the other. Where both pictures have as many samples, blocks alone tell, as noise
+    ///   makes either of two darker.
     /// - Values: all are 8-bit numbers in place of linear radiance, or noise ends at white where nothing is above.
     ///
     /// # Errors
@@ -174,11 +175,18 @@ fn ratio_of_brightness(one: &Still, other: &Still) -> Option<f64> {
     let total = |n: usize| all.iter().map(|block| block[n]).sum::<f64>();
     let (sums, squares) = ([total(0), total(1)], total(2));
     // Black in both says nothing
-    let lit = all.iter().filter(|[a, b, _]| *a > 0.0 || *b > 0.0);
-    let mut ratios: Vec<f64> = lit.map(|[a, b, _]| a / b).collect();
+    let lit = || all.iter().filter(|[a, b, _]| *a > 0.0 || *b > 0.0);
+    let mut ratios: Vec<f64> = lit().map(|[a, b, _]| a / b).collect();
     ratios.sort_by(f64::total_cmp);
     let (mean, median) = (sums[0] / sums[1], *ratios.get(ratios.len() / 2)?);
-    let differs =
-        (mean > BRIGHTER && median > BRIGHTER) || (mean < 1.0 / BRIGHTER && median < 1.0 / BRIGHTER);
-    ((sums[0] - sums[1]).abs() > CERTAIN * squares.sqrt() && differs).then_some(mean)
+    let is_brighter = |ratio: f64| !(1.0 / BRIGHTER..=BRIGHTER).contains(&ratio);
+    let is_certain = |sum: f64, squares: f64| sum.abs() > CERTAIN * squares.sqrt();
+    let alike = is_brighter(mean) && is_brighter(median) && (mean > 1.0) == (median > 1.0);
+    if alike && is_certain(sums[0] - sums[1], squares) {
+        return Some(mean);
+    }
+    // Noise of a lamp hides in the sums what all blocks show: exchanging a block's two changes the sign of its term alone
+    let terms = lit().map(|[a, b, _]| (a - b) / (a + b));
+    let (sum, squares) = terms.fold((0.0, 0.0), |(sum, squares), term| (sum + term, squares + term * term));
+    (one.spp == other.spp && is_brighter(median) && is_certain(sum, squares)).then_some(median)
 }

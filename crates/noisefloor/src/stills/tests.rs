@@ -27,6 +27,39 @@ fn pictures_of_different_things_are_noticed_and_noise_is_not() {
     assert_eq!(unlike(&still(|_| 0.5), &still(|_| 0.55)), 0);
 }
 
+/// A wall with a lamp in view whose own noise is larger than what the second picture lacks of the wall: 8 %, in all
+/// blocks. By chance alone, blocks say so with p < 10⁻⁹; and of pictures with unlike numbers of samples they say nothing,
+/// since most blocks of the noisier one are darker. Seeded.
+#[test]
+fn another_brightness_is_noticed_beside_a_lamp() {
+    let warnings = |seed: u64, bright: f64, [one, other]: [f64; 2]| {
+        let picture = |n: u64, bright: f64, spp: f64| {
+            let mut noise = noisefloor_testkit::Noise::keyed(&[24, seed, n]);
+            let mut light = |i: usize| {
+                let lamp = i % 128 < 16 && i / 128 < 16;
+                // One sample in 16 meets the light
+                let met = (0..spp as usize).filter(|_| noise.uniform() < 1.0 / 16.0).count();
+                (bright * if lamp { 50.0 } else { 0.3 } * 16.0 * met as f64 / spp) as f32
+            };
+            Still::new((128, 128), (0..128 * 128).map(|i| [light(i); 3]).collect(), spp)
+        };
+        let (one, other) = (picture(0, 1.0, one), picture(1, bright, other));
+        let samples = Some(Samples::Independent);
+        let pair = SnapshotPair::new(Evidence::Halves, &one, &[&other], ToneMapping::default(), samples);
+        pair.unwrap().warnings()
+    };
+    for seed in 0..8 {
+        let said = warnings(seed, 0.92, [256.0; 2]);
+        assert!(
+            matches!(said[..], [StillWarning::Brightness(times)] if (1.05..1.12).contains(&times)),
+            "{said:?}"
+        );
+        for spp in [[256.0; 2], [16.0; 2], [4.0, 64.0], [64.0, 4.0]] {
+            assert_eq!(warnings(seed, 1.0, spp), [], "{spp:?}");
+        }
+    }
+}
+
 fn judge(image: &Still, others: &[&Still]) -> Result<Samples, StillError> {
     let pair = SnapshotPair::new(Evidence::Halves, image, others, ToneMapping::default(), None)?;
     Ok(pair.samples())

@@ -13,6 +13,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use noisefloor::source::SourceIdentity;
+use noisefloor::stills::{Evidence, SnapshotPair, Still, StillWarning};
 use noisefloor::tune::{Ending, Excess, Knob, Look, Search};
 use noisefloor::{Params, Tile, ToneMapping};
 use noisefloor_cli::folder::Earlier;
@@ -88,6 +89,8 @@ struct Tune<'a> {
     views: Vec<View>,
     /// How each is displayed, once it was seen.
     tones: Vec<Option<ToneMapping>>,
+    /// Each as it was last seen, with the setting; none once it was said that the setting changes them.
+    before: Vec<Option<(f64, Still)>>,
     judges: Judges<'a>,
     identity: Vec<SourceIdentity>,
     rows: Vec<Row>,
@@ -118,6 +121,7 @@ impl<'a> Tune<'a> {
             keep,
             identity: identity?,
             tones: vec![None; views.len()],
+            before: vec![None; views.len()],
             views,
             judges,
             rows: Vec::new(),
@@ -180,6 +184,7 @@ impl<'a> Tune<'a> {
         bar.finish_and_clear();
         if look.crop.is_none() {
             self.tones[look.view] = Some(self.judges.tone(&judged));
+            self.compare(look, &judged);
         }
         if let Some(whole) = whole {
             // So many crops lie in so many views at the most, which are the worst
@@ -194,6 +199,31 @@ impl<'a> Tune<'a> {
             self.worst = Some((*look, judged));
         }
         Ok(found)
+    }
+
+    /// Says once that another setting makes a view brighter or darker.
+    fn compare(&mut self, look: &Look, judged: &Judged) {
+        let Some(place) = self.before.get_mut(look.view) else { return };
+        // Said to have unlike numbers of samples: noise of unlike settings is skewed unlike
+        let picture = Still::new(judged.size, judged.mean.clone(), 2.0);
+        let before = place.replace((look.setting, Still::new(judged.size, judged.mean.clone(), 1.0)));
+        let Some((setting, before)) = before else { return };
+        let tone = ToneMapping::default();
+        let Ok(pair) = SnapshotPair::new(Evidence::Reference, &picture, &[&before], tone, None) else {
+            return;
+        };
+        for warning in pair.warnings() {
+            if let StillWarning::Brightness(times) = warning {
+                let name = self.job.search.knob().name();
+                note!(
+                    "warning: with {name} {}, the picture is {times:.2} times as bright as with {setting}, by more than \
+                     noise explains: what a setting does to the picture beside its noise is not judged",
+                    look.setting
+                );
+                self.before.clear();
+                return;
+            }
+        }
     }
 
     fn step(&mut self, search: &Search) -> anyhow::Result<()> {
