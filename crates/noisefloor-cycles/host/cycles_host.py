@@ -77,6 +77,7 @@ class Cycles:
             "unit": "samples-per-pixel",
             # A GPU adds the samples of a pixel in any order
             "repeats": "nothing" if gpu else "samples",
+            "stratified": True,
             "warnings": warnings,
         }
 

@@ -106,6 +106,7 @@ class LuxCore:
             "unit": "mutations-per-pixel" if self.metropolis else "samples-per-pixel",
             "repeats": "nothing",
             "late": OVERRUN,
+            "stratified": sampler == "sobol",
             "warnings": warnings,
         }
 

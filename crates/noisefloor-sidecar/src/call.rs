@@ -59,7 +59,7 @@ pub(crate) struct Described {
 
 /// What the renderer says of itself, checked.
 pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
-    let Hello { name, width, height, unit, repeats, late, warnings } = hello;
+    let Hello { name, width, height, unit, repeats, late, stratified, warnings } = hello;
     let wrong = |what: String| (None, SidecarCause::Wrong { what });
     check_image(width, height).map_err(|e| wrong(e.to_string()))?;
     let name: String = name.chars().filter(|c| !c.is_control()).take(NAME).collect();
@@ -69,7 +69,8 @@ pub(crate) fn describe(hello: Hello) -> Result<Described, Blame> {
     }
     let warnings = warnings.iter().map(|warning| printable(warning).into_owned()).collect();
     let counts = if late > 0 { Counts::More } else { Counts::Asked };
-    let info = SourceInfo::new(name, width, height).with_unit(unit).with_repeats(repeats).with_counts(counts);
+    let info = SourceInfo::new(name, width, height).with_unit(unit).with_repeats(repeats);
+    let info = info.with_counts(counts).with_stratified(stratified);
     Ok(Described { info, late, warnings })
 }
 

@@ -35,7 +35,7 @@
 //!
 //! | request | reply |
 //! |---|---|
-//! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `late` (optional), `warnings` |
+//! | `init` | `name`, `width`, `height`, `unit`, `repeats`, `late` and `stratified` (optional), `warnings` |
 //! | `sample` | `samples`; payload: the means of the new samples of each tile that has any |
 //! | `first_hits` | `first_hits` (true or false); payload: albedo and normals of the whole image if true |
 //! | `adaptive` | `adaptive` (true or false), `counts` (optional); payload: the image, or its part, if true; with `counts` also the samples of each pixel, as another image |

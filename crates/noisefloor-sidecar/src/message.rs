@@ -61,6 +61,9 @@ pub(crate) struct Hello {
     /// time.
     #[serde(default)]
     pub(crate) late: u64,
+    /// [`noisefloor::SourceInfo::stratified`].
+    #[serde(default)]
+    pub(crate) stratified: bool,
     #[serde(default)]
     pub(crate) warnings: Vec<String>,
 }

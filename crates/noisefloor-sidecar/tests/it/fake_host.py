@@ -60,6 +60,7 @@ class Fake:
             "height": init["height"] or 40,
             "unit": "samples-per-pixel",
             "repeats": "samples",
+            "stratified": True,
             "warnings": ["max_depth %s, threads %s" % (init["max_depth"], init["threads"])] + ([note] if note else []),
         }
         starts = 0

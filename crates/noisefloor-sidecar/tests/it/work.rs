@@ -10,6 +10,7 @@ fn samples_come_as_they_were_rendered() {
     let info = source.info();
     assert_eq!((info.name.as_str(), info.width, info.height), ("Fake 1", SIZE.0, SIZE.1));
     assert_eq!((info.unit, info.aims, info.repeats), (Unit::SamplesPerPixel, true, Repeats::Samples));
+    assert!(info.stratified);
     for (first, samples) in [(0, 3), (3, 1), (u64::from(u32::MAX) * 7, 2)] {
         let mut requests = requests(first, samples);
         requests.reverse();
