@@ -6,7 +6,7 @@
 //!
 //! - `cargo test -p noisefloor-fuzz` runs the seeds, all inputs that ever failed (`found/TARGET/*`), and a
 //!   half a second of mutants of each target. It needs nothing but Rust; CI does it with a tenth of a second.
-//!   `NOISEFLOOR_FUZZ_SECONDS=200` sets another time; docs/benchmarks/stops.md has what came of that.
+//!   `NOISEFLOOR_FUZZ_SECONDS=200` sets another time.
 //! - `fuzz/run TARGET` runs libFuzzer, which is led by coverage, on stable Rust (it needs a C++ compiler).
 //!   `fuzz/run --all SECONDS` runs all targets in turn.
 

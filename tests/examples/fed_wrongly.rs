@@ -1,5 +1,5 @@
 //! What a session says of each mistake in a picture with a lamp in view, the built-in Cornell box:
-//! `fed_wrongly [EDGE [SEEDS]]` prints the table of docs/embedding.md, for square pictures in tiles of 64
+//! `fed_wrongly [EDGE [SEEDS]]` prints the table of the guide to embedding, for square pictures in tiles of 64
 //! pixels and up to 512 samples.
 #![allow(clippy::print_stdout, reason = "an example prints")]
 

@@ -1,5 +1,5 @@
 //! What renderers push by mistake in place of means of new samples: for the test `watch`, and for the table
-//! in docs/embedding.md, which the example `fed_wrongly` makes.
+//! in the guide to embedding, which the example `fed_wrongly` makes.
 
 use noisefloor::{
     Oracle, Params, ProgressiveSource, Request, Rgb, Session, SessionError, Tile, TileGrid,

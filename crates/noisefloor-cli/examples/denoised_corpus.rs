@@ -1,13 +1,10 @@
 //! Pictures to learn from how wrong denoised pictures are: benchmarks/larger.py runs it.
 //!
-//! `denoised_corpus render FOLDER SCENE EDGE`: renders a scene with the built-in path tracer, square, as `render --denoise oidn`
-//! does, and writes it at many numbers of samples: both halves, what Open Image Denoise makes of each half and of all samples with
-//! clean first hits, and the mean of four mirror images; two references with other seeds, and their denoised mean. All files hold
-//! linear radiance, `f32`, little-endian, row-major. Halves and references that are there already, from another renderer for instance,
-//! are taken as they are. Goes on where it was stopped; `samples.csv` says that all is there.
-//!
-//! `denoised_corpus levels FOLDER SCENE WIDTHxHEIGHT SEED MOST`: the same levels of larger pictures, up to MOST samples, without
-//! references. After 256 samples, a tile goes on only to four times what it, or one beside it, is estimated to need for 0.2 JOD. Also how
+//! `denoised_corpus levels FOLDER SCENE WIDTHxHEIGHT SEED MOST`: renders a scene with the built-in path tracer, as `render --denoise
+//! oidn` does, and writes it at many numbers of samples, up to MOST: both halves, what Open Image Denoise makes of each half and of all
+//! samples with clean first hits, and the mean of four mirror images. All files hold linear radiance, `f32`, little-endian, row-major.
+//! Halves that are there already, from another renderer for instance, are taken as they are. `samples.csv` says that all is there.
+//! After 256 samples, a tile goes on only to four times what it, or one beside it, is estimated to need for 0.2 JOD. Also how
 //! many samples each tile has, what they took, and what a tile that lacks light would lose by it.
 //!
 //! `denoised_corpus reference FOLDER SCENE WIDTHxHEIGHT SEED SPP…`: FOLDER/reference-SEED.f32, with so many samples in each tile.
@@ -17,9 +14,6 @@
 //!
 //! `denoised_corpus estimate FOLDER`: JODs that each tile of 32 pixels, and the square of 64 around it, is estimated to have lost
 //! at each number of samples, has truly lost, and its noise has, as lines of CSV.
-//!
-//! `denoised_corpus jods`: reads pairs of grey pictures, test and reference, as displayed: width and height as `u32`, then the pixels;
-//! and writes the JODs lost, a line each.
 #![allow(clippy::print_stdout, reason = "it is what this example is for")]
 
 use noisefloor::{
@@ -34,7 +28,7 @@ use noisefloor_sidecar::FilterPlan;
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use std::error::Error;
 use std::fmt::Write as _;
-use std::io::{BufWriter, Read, Write};
+use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -44,28 +38,22 @@ const SQUARE: usize = 64;
 /// Samples per pixel of both halves together.
 const LEVELS: [u64; 18] =
     [16, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024, 1536, 2048, 3072, 4096, 6144, 8192];
-/// The last of small pictures.
-const MOST: u64 = 1024;
 /// What all tiles get, a loss that is hardly noticed, and how many times more tiles get that have lost it.
 const FOR_ALL: u64 = 256;
 const LITTLE: f64 = 0.2;
 const MORE: u64 = 4;
-/// Samples per pixel of each of the two references.
-const REFERENCE: u64 = 4096;
 /// Rays a pixel for first hits, at most, as `render` has it.
 const RAYS: u64 = 128;
-const SEEDS: [u64; 3] = [1, 77, 78];
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
 fn main() -> Outcome<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["render", folder, scene, edge] => render(Path::new(folder), scene, edge.parse()?),
         ["levels", folder, scene, size, seed, most] => {
             let folder = Path::new(folder);
             std::fs::create_dir_all(folder)?;
-            levels(folder, &Opened::new(scene, size_of(size)?)?, seed.parse()?, most.parse()?, true).map(drop)
+            levels(folder, &Opened::new(scene, size_of(size)?)?, seed.parse()?, most.parse()?)
         }
         ["reference", folder, scene, size, seed, ref spp @ ..] => {
             let spp: Vec<u64> = spp.iter().map(|spp| spp.parse()).collect::<Result<_, _>>()?;
@@ -74,7 +62,6 @@ fn main() -> Outcome<()> {
         }
         ["rivals", folder] => rivals(Path::new(folder)),
         ["estimate", folder] => estimate(Path::new(folder)),
-        ["jods"] => jods(),
         _ => Err("see the first lines of denoised_corpus.rs".into()),
     }
 }
@@ -176,23 +163,8 @@ fn reference(path: PathBuf, scene: &Opened, seed: u64, spp: &[u64]) -> Outcome<(
     keep(path, &film.image())
 }
 
-fn render(folder: &Path, scene: &str, edge: usize) -> Outcome<()> {
-    if folder.join("samples.csv").exists() {
-        return Ok(());
-    }
-    std::fs::create_dir_all(folder)?;
-    let scene = Opened::new(scene, (edge, edge))?;
-    for (seed, name) in [(SEEDS[1], "reference-a"), (SEEDS[2], "reference-b")] {
-        let path = folder.join(format!("{name}.f32"));
-        if !path.exists() {
-            reference(path, &scene, seed, &[REFERENCE])?;
-        }
-    }
-    levels(folder, &scene, SEEDS[0], MOST, false)
-}
-
 /// Writes all levels, and then which there are.
-fn levels(folder: &Path, scene: &Opened, seed: u64, most: u64, only_open: bool) -> Outcome<()> {
+fn levels(folder: &Path, scene: &Opened, seed: u64, most: u64) -> Outcome<()> {
     if folder.join("samples.csv").exists() {
         return Ok(());
     }
@@ -221,11 +193,10 @@ fn levels(folder: &Path, scene: &Opened, seed: u64, most: u64, only_open: bool) 
                 .filter(|tile| level <= FOR_ALL || level <= beside(grid, &needs, *tile).saturating_mul(MORE))
                 .map(|tile| (tile.index, level))
                 .collect();
-            if only_open && wanted.is_empty() {
+            if wanted.is_empty() {
                 break;
             }
-            let all: Vec<(usize, u64)> = grid.tiles().map(|tile| (tile.index, level)).collect();
-            sample(&mut source, &mut film, if only_open { &wanted } else { &all }, &mut seconds)?;
+            sample(&mut source, &mut film, &wanted, &mut seconds)?;
             halves(&film)
         } else {
             [load(&kept[0])?, load(&kept[1])?]
@@ -242,7 +213,7 @@ fn levels(folder: &Path, scene: &Opened, seed: u64, most: u64, only_open: bool) 
         {
             keep(folder.join(format!("{name}-{level:05}.f32")), picture)?;
         }
-        if rendered && only_open {
+        if rendered {
             let display = ToneMapping::default().settle(&all);
             let eyes = &mut Eyes::default();
             let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
@@ -340,18 +311,14 @@ impl Kept {
         };
         let grid = TileGrid::new(width.parse()?, height.parse()?, TILE)?;
         let mut spp: Vec<(u64, Vec<u64>)> = Vec::new();
-        if let Ok(counts) = std::fs::read_to_string(folder.join("counts.csv")) {
-            for line in counts.lines().skip(1) {
-                let mut numbers = line.split(',').map(str::parse);
-                let mut next = || numbers.next().ok_or("counts.csv has too few columns");
-                let (level, _tile, count) = (next()??, next()??, next()??);
-                match spp.last_mut() {
-                    Some((last, counts)) if *last == level => counts.push(count),
-                    _ => spp.push((level, vec![count])),
-                }
+        for line in std::fs::read_to_string(folder.join("counts.csv"))?.lines().skip(1) {
+            let mut numbers = line.split(',').map(str::parse);
+            let mut next = || numbers.next().ok_or("counts.csv has too few columns");
+            let (level, _tile, count) = (next()??, next()??, next()??);
+            match spp.last_mut() {
+                Some((last, counts)) if *last == level => counts.push(count),
+                _ => spp.push((level, vec![count])),
             }
-        } else {
-            spp.extend(LEVELS.into_iter().filter(|&level| level <= MOST).map(|l| (l, vec![l; grid.len()])));
         }
         Ok(Self { grid, clean: clean.parse()?, spp })
     }
@@ -503,27 +470,4 @@ fn rivals(folder: &Path) -> Outcome<()> {
         }
     }
     Ok(std::io::stdout().write_all(out.as_bytes())?)
-}
-
-fn jods() -> Outcome<()> {
-    let (mut from, mut to) = (std::io::stdin().lock(), BufWriter::new(std::io::stdout().lock()));
-    let (eyes, mut room) = (VisionModel::new(&Viewing::default()), VisionWorkspace::default());
-    let mut sides = [0; 8];
-    loop {
-        match from.read_exact(&mut sides) {
-            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => return Ok(to.flush()?),
-            read => read?,
-        }
-        let [width, height] =
-            [0, 4].map(|at| sides[at..at + 4].iter().rfold(0, |n, &b| 256 * n + usize::from(b)));
-        if width.max(height) > 1024 {
-            return Err("pictures of at most 1024 pixels to a side".into());
-        }
-        let mut bytes = vec![0; 8 * width * height];
-        from.read_exact(&mut bytes)?;
-        let grey: Vec<Rgb> =
-            bytes.chunks_exact(4).map(|b| [f32::from_le_bytes([b[0], b[1], b[2], b[3]]); 3]).collect();
-        let (test, reference) = grey.split_at(width * height);
-        writeln!(to, "{:.5}", 10.0 - eyes.compare(test, reference, (width, height), &mut room)?.jod())?;
-    }
 }

@@ -42,7 +42,7 @@ pub(crate) type SampleRadiance = fn(&Scene, Settings, Ray, &mut Sampler, &mut St
 
 /// The integrator for scenes with or without partly transparent surfaces. It is compiled for both, since the
 /// test costs up to 8 %; code for textures, microfacets, mirrors and skies costs other scenes 0 to 4 %, and
-/// is always there (docs/benchmarks/path-tracer.md). Inlined into another crate, it would bring all of the integrator with it,
+/// is always there. Inlined into another crate, it would bring all of the integrator with it,
 /// to be compiled once more, and in a build for tests without optimisation.
 #[inline(never)]
 pub(crate) fn integrator(opacity: bool) -> SampleRadiance {

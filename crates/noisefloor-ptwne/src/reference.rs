@@ -12,8 +12,7 @@
 //! [`MAX_SAMPLES`] samples in each half. [`ReferenceNoise`] reports the noise that was left.
 //!
 //! Each pixel has its own scrambling too. If all shared one, neighbours would err alike: the noise mask would
-//! have less energy at full resolution, and more at the coarser scales that the oracle looks at too
-//! (`docs/benchmarks/path-tracer.md`).
+//! have less energy at full resolution, and more at the coarser scales that the oracle looks at too.
 //!
 //! Blocks do not depend on each other, nor on threads. Two halves cannot detect what both miss, such as an
 //! edge that both see alike. Where neighbours differ, a pixel is therefore assumed to have the error that its

@@ -8,9 +8,9 @@ use noisefloor::{
     criterion::{CriterionError, View},
 };
 
-/// Default of [`Myszkowski1998::probability`]: agrees with people on average (docs/benchmarks/stops.md).
+/// Default of [`Myszkowski1998::probability`]: agrees with people on average.
 pub(crate) const DEFAULT_SEEN: f64 = 0.94;
-/// Default of [`Takouachet2007::probability`]: agrees with people on average (docs/benchmarks/stops.md).
+/// Default of [`Takouachet2007::probability`]: agrees with people on average.
 pub(crate) const DEFAULT_GROWTH: f64 = 0.74;
 /// Default share of a tile's pixels that may differ.
 const DEFAULT_SHARE: f64 = 0.01;
@@ -84,7 +84,7 @@ fn verdicts(map: Option<&[f32]>, width: usize, tiles: &[Tile], limit: f64, share
 #[derive(Clone, Debug)]
 pub struct Myszkowski1998 {
     /// Probability of detection above which a pixel differs visibly, in (0, 1). The default of 0.94
-    /// agrees with people on average, on synthesised renderings (`docs/benchmarks/stops.md`).
+    /// agrees with people on average, on synthesised renderings.
     pub probability: f64,
     /// Share of a tile's pixels that may do so, in [0, 1]; 0.01 by default.
     pub share: f64,
@@ -147,7 +147,7 @@ impl StoppingCriterion for Myszkowski1998 {
 #[derive(Clone, Debug)]
 pub struct Takouachet2007 {
     /// Change of the probability of detection above which a pixel has changed, in (0, 1). The default of 0.74
-    /// agrees with people on average, on synthesised renderings (`docs/benchmarks/stops.md`).
+    /// agrees with people on average, on synthesised renderings.
     pub probability: f64,
     /// Share of a tile's pixels that may do so, in [0, 1]; 0.01 by default.
     pub share: f64,

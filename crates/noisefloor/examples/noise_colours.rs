@@ -101,7 +101,7 @@ fn visible(kernel: fn(isize, isize) -> f64) -> f64 {
 /// Display value at a pixel.
 type Picture = fn(usize, usize) -> f64;
 
-/// Its sequence is that of the published table (docs/accuracy.md), which is why it is not the testkit's `Noise`.
+/// Its sequence is that of the published table, which is why it is not the testkit's `Noise`.
 struct Random(u64);
 
 impl Random {

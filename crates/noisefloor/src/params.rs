@@ -38,7 +38,7 @@ pub enum Schedule {
 
 impl Default for Schedule {
     /// Spaced, in steps of 8. A tile stops within a few percent of its need; the paper's steps of 100 overshoot the need by a
-    /// fifth in ordinary scenes (docs/benchmarks/stops.md).
+    /// fifth in ordinary scenes.
     fn default() -> Self {
         Self::Spaced { step: Self::STEP }
     }
@@ -161,7 +161,7 @@ impl Audience {
 #[non_exhaustive]
 pub struct Params {
     /// Tile edge in pixels, 16…512; see [`crate::TileGrid`] for the last column and row. A tile stops as a whole. Smaller tiles
-    /// take fewer samples (`docs/benchmarks/stops.md`). People judged zones of 128 and 200 pixels; below 64 the model knows
+    /// take fewer samples. People judged zones of 128 and 200 pixels; below 64 the model knows
     /// less.
     pub tile: usize,
     /// How radiance is displayed.

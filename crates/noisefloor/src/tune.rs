@@ -36,8 +36,8 @@ use thiserror::Error;
 const AIM: f64 = 0.9;
 /// The slope of log(excess) over log(effort), assumed until two steps have measured it: noise falls with the root of the samples.
 const NOISE: f64 = 0.5;
-/// Measured slopes are clamped to this range. The error of denoised pictures falls with slopes of 0.3 to 0.7
-/// (`docs/denoising.md`). While all pixels have the fewest samples that the renderer takes, it does not fall.
+/// Measured slopes are clamped to this range. The error of denoised pictures falls with slopes of 0.3 to 0.7.
+/// While all pixels have the fewest samples that the renderer takes, it does not fall.
 const SLOPES: (f64, f64) = (0.2, 1.0);
 /// A step multiplies the effort by at least this factor and at most [`LEAP`]. A coarse picture says nothing of light that it
 /// has not met, and a step too far is paid for twice.

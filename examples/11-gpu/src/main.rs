@@ -1,6 +1,6 @@
 //! A path tracer on the GPU that stops when nobody sees noise, and never waits for a verdict.
 //!
-//! `trace.wgsl` renders; this file is the loop of docs/embedding.md: samples are summed up on the card until the next
+//! `trace.wgsl` renders; this file is the loop of the guide to embedding: samples are summed up on the card until the next
 //! verdict wants them, and come back once. It runs on whatever Vulkan, Metal or DirectX 12 offers, on Mesa's software
 //! device, too. Where there is none, it says so, and ends.
 //!

@@ -94,7 +94,7 @@ fn a_support_vector_machine_predicts_left_out_scenes_too() {
     assert!(scores.error_factor < 1.5 && scores.early_share <= 0.05, "{scores:?}");
 }
 
-/// The score in `docs/accuracy.md` with everything chosen without the scene that is predicted.
+/// The published score with everything chosen without the scene that is predicted.
 #[test]
 fn with_blind_choices_the_vision_model_errs_less_than_one_noise_level() {
     let every = fixture("human-choices.csv");

@@ -1,4 +1,4 @@
-//! How many people and tiles it takes to measure how far people lie from each other: prints the table in docs/studies.md.
+//! How many people and tiles it takes to measure how far people lie from each other: prints the table of the guide to studies.
 //! Takes minutes.
 //!
 //! ```sh

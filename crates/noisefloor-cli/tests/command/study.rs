@@ -95,7 +95,7 @@ fn levels_are_denoised_by_any_program() {
     assert!(left.all(|name| name == ".noisefloor.lock"));
 }
 
-/// The protocol of docs/studies.md, rehearsed: a denoised stack, the study file of that page, simulated
+/// The protocol for denoised pictures, rehearsed: a denoised stack, the study file of that page, simulated
 /// observers, and their analysis.
 #[test]
 fn a_denoised_stack_goes_through_a_whole_study() {

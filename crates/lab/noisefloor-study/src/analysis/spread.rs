@@ -20,7 +20,7 @@ const ROOM: f64 = 4.0;
 const LEAST: usize = 4;
 /// How many times as wide as the jackknife's the intervals are. A variance of few people is known less well than their
 /// own scatter says where a few need much more than the rest: without this, 90 of 100 intervals of simulated studies
-/// held the truth instead of 95 (docs/studies.md).
+/// held the truth instead of 95.
 const CAUTION: f64 = 1.2;
 
 /// Standard deviations of ln(samples per pixel).

@@ -9,7 +9,7 @@ use noisefloor_pages::viewing::{Ambient, Conditions};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::f64::consts::PI;
 
-/// Share of the variance between people that is common to all places: 0.36² of 0.5² (docs/accuracy.md).
+/// Share of the variance between people that is common to all places: 0.36² of 0.5².
 const COMMON: f64 = 0.52;
 
 /// The population that simulated observers are drawn from.

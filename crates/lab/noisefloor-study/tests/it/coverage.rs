@@ -125,7 +125,7 @@ fn forced_choice_needs_fewer_clicks_for_the_same_precision() {
     assert!(choosing_clicks < pointing_clicks && choosing_error < pointing_error);
 }
 
-/// The study of docs/studies.md in small: levels by ×1.35, six stacks with two tiles each, shown twice.
+/// The study that measures people's scatter, in small: levels by ×1.35, six stacks with two tiles each, shown twice.
 fn spread_study() -> (Folder, Arc<Study>) {
     let levels: Vec<u64> = (0..20).map(|i| (8.0 * 1.35f64.powi(i)).round() as u64).collect();
     let names = ["a", "b", "c", "d", "e", "f"];
@@ -158,7 +158,7 @@ fn found_spread(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) 
 }
 
 /// Twelve people and twelve tiles, 30 studies of each spread: the variance is found on average, and its intervals hold
-/// the truth. The square of one study's estimate scatters by some 35 % (docs/studies.md), the mean of 30 by 6.4 %: 3.5 of
+/// the truth. The square of one study's estimate scatters by some 35 %, the mean of 30 by 6.4 %: 3.5 of
 /// these are 22 %. Of 30 intervals that hold it in 93 of 100 cases, fewer than 23 do once in 800. Seeded.
 #[test]
 fn the_spread_of_people_is_found() {

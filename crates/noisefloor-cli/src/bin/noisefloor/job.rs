@@ -16,7 +16,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 /// The first verdict on denoised halves of the built-in renderer, in samples per pixel: what two denoisings cost is worth
-/// more of its samples than of slower renderers' (docs/benchmarks/denoised.md).
+/// more of its samples than of slower renderers'.
 pub const FIRST_DENOISED: u64 = 32;
 
 /// What is rendered, who stops it, and until when: all that picture and stops depend on. Values are

@@ -86,7 +86,7 @@ pub enum Preset {
 }
 
 /// Windows are what is judged, whatever the tiles, and in smaller tiles fewer samples go where no window asks for them:
-/// tiles of 64 pixels take ×0.82 of what tiles of 128 take to the same worst window (docs/benchmarks/stops.md).
+/// tiles of 64 pixels take ×0.82 of what tiles of 128 take to the same worst window.
 const TILE: usize = 64;
 /// Denoised pictures are judged by squares of 64 pixels. Many tiles cost other renderers much.
 const DENOISED_TILE: usize = 32;

@@ -8,8 +8,7 @@ const LEAST: Duration = Duration::from_secs(30);
 /// Checkpoint and pictures may take a hundredth of the time each: a pause is 99 times as long as what comes
 /// before it took.
 const PAUSES: u32 = 99;
-/// Nanoseconds that a pixel of a checkpoint and of all pictures take, until it is measured
-/// (docs/benchmarks/cost.md).
+/// Nanoseconds that a pixel of a checkpoint and of all pictures take, until it is measured.
 const CHECKPOINT: u64 = 80;
 const PICTURES: u64 = 600;
 
