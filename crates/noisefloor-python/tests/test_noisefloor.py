@@ -1199,23 +1199,6 @@ class Settings(unittest.TestCase):
         self.assertTrue(0.75 < other.ratio < 1.15, other)
         self.assertEqual(search.steps[-1][1], found.ratio)
         self.assertLessEqual(found.ratio * 2**0.5, 1)
-
-    def test_noise_in_levels_and_plateaus_is_claimed_as_it_was_seen(self):
-        """A renderer that looks at its threshold now and then; and one whose pixels have its fewest samples for long."""
-        for level in (1.1, 2**0.5, 2, 4):
-            for phase in np.linspace(0, 1, 15):
-                def noise(threshold):
-                    return level ** (np.floor(np.log(threshold) / np.log(level) - phase) + phase)
-
-                search = nf.Search(threshold=(0.2, 1e-4))
-                for each in (look.each for look in search):
-                    search.tell(noise(each) / 2**0.5 / 0.03)
-                self.assertLessEqual(noise(search.setting), 0.03 * (1 + 1e-9), (level, phase, search.steps))
-        for above in (0.05, 0.03, 0.01):
-            search = nf.Search(threshold=(0.2, 0.001))
-            for each in (look.each for look in search):
-                search.tell(nf.excess(*(self.noisy(seed, 2 * min(each, above)) for seed in (1, 2))))
-            self.assertEqual(search.ending, "found", search.steps)
         # Where samples are known to follow, the mean of two speaks for one that is finer
         search = nf.Search(threshold=(0.2, 0.001))
         for each in (look.each for look in search):
