@@ -654,7 +654,9 @@ impl<C: StoppingCriterion> Session<C> {
         if streak >= consecutive {
             let wanted = audience.samples(samples);
             if wanted <= samples {
-                return Some(self.stop(index, self.satisfied()));
+                // Of samples that look wrong, a tile is judged at its limit alone
+                let wrong = self.watch.looks_wrong() && !self.criterion.only_counts();
+                return Some(self.stop(index, if wrong { StopReason::MaxSpp } else { self.satisfied() }));
             }
             state.goal = Goal::Audience { spp: wanted.min(max_spp).max(samples + 1) };
         }

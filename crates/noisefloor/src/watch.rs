@@ -362,12 +362,17 @@ impl Watch {
     /// them; larger ones are brighter; all are one picture of one size, which may have noise; or running means are of so few bits that they are
     /// going to end.
     pub(crate) fn doubts(&self) -> bool {
+        self.looks_wrong()
+            || self.tiles.iter().any(|tile| tile.grows && tile.batches < 4)
+            || self.alike().is_some()
+    }
+
+    /// Whether that is for what batches are, and not since too few have come to tell: then no tile converges at its limit.
+    pub(crate) fn looks_wrong(&self) -> bool {
         let sums = &self.sums[0];
         sums.doubt().is_some()
             || sums.may_be_totals().is_some()
-            || self.tiles.iter().any(|tile| tile.grows && tile.batches < 4)
             || sums.encoded().is_some()
-            || self.alike().is_some()
             || (self.running && self.warnings.iter().any(|warning| matches!(warning, Warning::Rounded(_))))
     }
 

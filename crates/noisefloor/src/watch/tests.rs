@@ -1,8 +1,10 @@
 //! What is said of each mistake, and that nothing is said of what is right.
 
 use super::*;
+use crate::criterion::{CriterionError, View};
 use crate::rgb::Rgb;
-use crate::{FixedSpp, Params, Schedule, Session, SessionError, source::PixelNoise};
+use crate::source::PixelNoise;
+use crate::{FixedSpp, Params, Schedule, Session, SessionError, StopReason, StoppingCriterion};
 use noisefloor_testkit::Noise;
 
 const EDGE: usize = 128;
@@ -540,6 +542,38 @@ fn values_whose_mean_depends_on_the_size_of_a_batch_are_noticed() {
     assert!(encoded(&pushed(&|c, _| c / (1.0 + c))), "tone mapped");
     assert!(encoded(&pushed(&|c, spp| c * spp as f32)), "sums");
     assert_eq!(pushed(&|c, _| c), []);
+
+    // At the limit, their tiles are done, and have not converged
+    let limit = ASKED[..6].iter().sum();
+    for (sums, reason) in [(false, StopReason::Converged), (true, StopReason::MaxSpp)] {
+        let params = Params { tile: 64, min_spp: limit, max_spp: limit, ..Params::default() };
+        let mut session = Session::new(EDGE, EDGE, Content, params).unwrap();
+        for spp in &ASKED[..6] {
+            let mean = room.mean(session.film().spp(0), *spp);
+            let times = if sums { *spp as f32 } else { 1.0 };
+            session.push_image(*spp, &mixed(times, &mean, 0.0, &mean)).unwrap();
+        }
+        session.judge().unwrap();
+        let reasons: Vec<StopReason> = session.stops().map(|stop| stop.reason).collect();
+        assert_eq!(reasons, [reason; 4], "{sums}");
+    }
+}
+
+/// Sees no noise in anything.
+struct Content;
+
+impl StoppingCriterion for Content {
+    fn name(&self) -> String {
+        "content".into()
+    }
+
+    fn fingerprint(&self) -> String {
+        self.name()
+    }
+
+    fn judge(&mut self, _: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+        Ok(vec![Verdict::new(true); tiles.len()])
+    }
 }
 
 /// The call that one knows, with the numbers that one has: running means, each said to be of all its samples.

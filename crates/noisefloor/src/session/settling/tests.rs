@@ -215,7 +215,8 @@ fn what_stopped_under_another_exposure_is_looked_at_again() {
         "{:?}, {now}",
         session.stops().collect::<Vec<_>>()
     );
-    assert!(session.stops().all(|stop| stop.reason == StopReason::Converged));
+    // Such light is as that of values whose mean depends on the size of a batch: tiles are judged at their limit alone
+    assert!(session.stops().all(|stop| stop.reason == StopReason::MaxSpp));
 }
 
 #[test]
