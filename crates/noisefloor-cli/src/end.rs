@@ -5,6 +5,9 @@ use clap::error::ErrorKind;
 use std::fmt;
 use std::process::ExitCode;
 
+/// Exit code where the answer to a question is no, and the code was asked for (`--check`): nothing has failed.
+pub const ANSWER_IS_NO: u8 = 3;
+
 /// What was typed has to be typed otherwise: exit code 2.
 #[derive(Debug)]
 pub struct Usage(pub String);

@@ -11,7 +11,9 @@ use crate::say::note;
 use crate::spell::{JobPath, as_typed, with_frame};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
-use noisefloor::{ProgressiveSource, Schedule, SourceError, Tile, source::Reference, stills::SampleOrigin};
+use noisefloor::{
+    Film, ProgressiveSource, Schedule, SourceError, Tile, source::Reference, stills::SampleOrigin,
+};
 use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
@@ -252,6 +254,16 @@ impl SourceJob {
         one
     }
 
+    /// The same scene with other samples, to audit a render by.
+    pub fn audited(&self, seed: u64) -> anyhow::Result<Self> {
+        if self.kind == SourceKind::Exr {
+            bail!("pictures that are played back have no other samples to compare with");
+        }
+        // Longer than the words of a frame: no render has that seed
+        let seed = scattered(&[0, self.seed, seed].map(u64::to_le_bytes).concat());
+        Ok(Self { seed, ..self.clone() })
+    }
+
     /// Whether the renderer can be told which frame of a scene file it is to render.
     fn holds_all_frames(&self) -> bool {
         matches!(self.kind, SourceKind::Adapter(adapter) if adapter.frames)
@@ -331,13 +343,47 @@ impl SourceJob {
     }
 }
 
+/// Samples tiles until each has as many samples per pixel as are wanted of it, in both halves alike; says which share of them
+/// is there.
+pub fn fill(
+    source: &mut dyn Source,
+    film: &mut Film,
+    wanted: &[(Tile, u64)],
+    mut told: impl FnMut(f64),
+) -> anyhow::Result<()> {
+    /// Samples per pixel between two looks at the signals.
+    const BATCH: u64 = 64;
+    let all: u64 = wanted.iter().map(|(_, spp)| spp).sum();
+    loop {
+        let missing = |(tile, spp): &(Tile, u64)| spp.saturating_sub(film.spp(tile.index));
+        let behind = wanted.iter().filter(|tile| missing(tile) > 0);
+        // A request belongs to the half with fewer: in pairs, both stay alike
+        let request = |tile: &(Tile, u64)| film.request(tile.0.index, missing(tile).div_ceil(2).min(BATCH));
+        let requests: Vec<_> = behind.map(request).collect();
+        told(1.0 - wanted.iter().map(missing).sum::<u64>() as f64 / all.max(1) as f64);
+        if requests.is_empty() {
+            return Ok(());
+        }
+        for batch in source.sample(&requests)? {
+            if batch.spp == 0 {
+                bail!("the source has no more samples");
+            }
+            film.add(batch.tile.index, batch.spp, &batch.mean)?;
+        }
+    }
+}
+
 /// The seed of a frame. Scattered, since some renderers derive related random numbers from neighbouring seeds; of as
 /// many bits as all languages take for an integer.
 fn seed_of_frame(seed: u64, frame: i32) -> u64 {
     let mut words = [0; 12];
     words[..8].copy_from_slice(&seed.to_le_bytes());
     words[8..].copy_from_slice(&frame.to_le_bytes());
-    let digest = blake3::hash(&words);
+    scattered(&words)
+}
+
+fn scattered(words: &[u8]) -> u64 {
+    let digest = blake3::hash(words);
     let first: [u8; 8] = std::array::from_fn(|i| digest.as_bytes()[i]);
     u64::from_le_bytes(first) >> 11
 }

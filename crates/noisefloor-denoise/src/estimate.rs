@@ -169,6 +169,12 @@ impl DenoisedError {
         Self { light: Vec::new(), ..self }
     }
 
+    /// The same in a film of which nothing wrong stands still.
+    pub(crate) fn new_in_every_frame(mut self) -> Self {
+        self.fields.iter_mut().for_each(|field| field.standing.clear());
+        self
+    }
+
     /// Width and height in pixels.
     pub fn size(&self) -> (usize, usize) {
         self.size

@@ -5,6 +5,7 @@
 //! - [`Guides`]: albedo and normals for both halves, and whether they are clean.
 //! - [`MirrorMean`]: the mean of what a denoiser makes of a picture and of its mirror images.
 //! - [`DenoisedError`]: what is wrong with a denoised picture, from two halves and what becomes of each.
+//! - [`jods_lost_beside`]: what a finished picture has lost, beside another render of the view.
 //! - [`DenoisedQuality`]: a [`noisefloor::StoppingCriterion`] that stops tiles by it, for
 //!   [`noisefloor::Session`] and [`noisefloor::Driver`].
 //!
@@ -42,6 +43,7 @@
 //! ```
 
 mod bands;
+mod beside;
 mod brightness;
 mod criterion;
 mod denoiser;
@@ -56,6 +58,7 @@ mod record;
 mod thin;
 mod unmet;
 
+pub use beside::jods_lost_beside;
 pub use criterion::{
     DEFAULT_JODS_LOST, DenoisedQuality, spp_with_denoising, spp_without_denoising, stops_err_by,
 };

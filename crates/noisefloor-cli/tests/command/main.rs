@@ -4,6 +4,9 @@
 /// Lines from one public to another.
 #[cfg(test)]
 mod audience;
+/// Whether renders keep what they promise.
+#[cfg(test)]
+mod audit;
 /// One line, no panic, nothing lost.
 #[cfg(test)]
 mod bad_input;

@@ -1,6 +1,7 @@
 //! What can be typed, one file a command. Each command's arguments become a checked job; nothing typed goes
 //! further.
 
+mod audit;
 mod calibrate;
 mod config;
 mod doctor;
@@ -14,6 +15,7 @@ mod scenes;
 mod tune;
 mod verdicts;
 
+pub use audit::AuditArgs;
 pub use calibrate::CalibrateArgs;
 pub use config::expand;
 pub use doctor::DoctorArgs;
@@ -46,6 +48,7 @@ use std::path::PathBuf;
     max_term_width = 110,
     propagate_version = true,
     after_help = "Exit codes: 0 done; 1 failed, with one line that says why; 2 wrong usage, or not in this build;
+3 with --check: the answer is no;
 130 stopped by Ctrl-C or SIGTERM after writing what there was."
 )]
 pub struct Cli {
@@ -61,6 +64,7 @@ pub enum Command {
     Frame,
     Tune(Box<TuneArgs>),
     Farm(FarmArgs),
+    Audit(AuditArgs),
     Reference(ReferenceArgs),
     Judge(JudgeArgs),
     Metrics(MetricsArgs),

@@ -169,6 +169,10 @@ pub struct RenderRun {
     /// Address of a viewer.
     pub tev: Option<String>,
     pub watch: Option<WatchPage>,
+    /// How many places are rendered again afterwards.
+    pub audit: Option<usize>,
+    /// Whether the exit code tells of an audit.
+    pub check: bool,
 }
 
 /// Where to serve a page with the picture so far.

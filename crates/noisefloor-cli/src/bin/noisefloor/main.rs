@@ -3,6 +3,7 @@
 #![allow(missing_docs, unreachable_pub, reason = "a command has no public items")]
 
 mod args;
+mod audit;
 mod calibrate;
 mod doctor;
 mod farm;
@@ -38,6 +39,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Tune(args) => tune::run(args.check()?),
         Command::Calibrate(args) => calibrate::run(args.check()?).map(done),
         Command::Farm(args) => farm::run(args.check()?),
+        Command::Audit(args) => audit::run(&args.check()?),
         Command::Reference(args) => reference::run(args.check()?),
         Command::Judge(args) => judge::run(&args.check()?).map(done),
         Command::Metrics(args) => metrics::run(&args.check()?).map(done),

@@ -9,7 +9,7 @@ mod tiles;
 pub use denoised::{Denoised, ERROR_SCALE};
 pub use summary::say_noise;
 
-use crate::job::RenderJob;
+use crate::job::{CriterionJob, RenderJob};
 use anyhow::{Context, bail};
 use noisefloor::{
     Checkpoint, Rgb, Session,
@@ -73,8 +73,9 @@ pub type Over<'a> = (Clock, Option<&'a dyn Source>);
 const CHECKPOINT: &str = "checkpoint.nfc";
 /// That of a finished render, for whoever asks for more of it.
 const FINISHED: &str = "finished.nfc";
-const REPORT: &str = "report.json";
+pub const REPORT: &str = "report.json";
 const PICTURE: &str = "image.exr";
+const DENOISED: &str = "image-denoised.exr";
 const SHOWN: &str = "image.png";
 
 impl Output {
@@ -281,6 +282,11 @@ fn finished_by(folder: &Path, is_this: impl Fn(&Value) -> bool) -> anyhow::Resul
         true => Finished::Lost,
         false => Finished::Other,
     })
+}
+
+/// The picture that people look at.
+pub fn picture_of(job: &RenderJob) -> &'static str {
+    if matches!(job.criterion, CriterionJob::Denoised { .. }) { DENOISED } else { PICTURE }
 }
 
 /// The file that shows that a folder holds a render, whosever it is.

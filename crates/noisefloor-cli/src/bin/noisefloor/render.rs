@@ -11,6 +11,7 @@ mod tev;
 #[cfg(feature = "watch")]
 mod watch;
 
+use crate::audit::{self, AuditJob};
 use crate::job::{CriterionJob, Ready, RenderJob, RenderRun};
 use crate::output::{Finished, Output, finished_frame};
 use anyhow::{Context, anyhow, bail};
@@ -55,7 +56,19 @@ pub fn run(run: &RenderRun) -> anyhow::Result<ExitCode> {
 fn render(run: &RenderRun, is_frame: bool) -> anyhow::Result<ExitCode> {
     let Some(mut ready) = Prepared::new(run, is_frame)? else { return Ok(ExitCode::SUCCESS) };
     let outcome = ready.sample(run);
-    ready.finish(run, outcome)
+    let folder = ready.output.folder().to_string();
+    let (ended, places) = (ready.finish(run, outcome)?, run.audit);
+    let Some(places) = places.filter(|_| ended == ExitCode::SUCCESS) else { return Ok(ended) };
+    audit::run(&AuditJob {
+        folder: folder.into(),
+        places,
+        seed: run.job.source.seed,
+        lost: None,
+        check: run.check,
+        json: false,
+        quiet: run.quiet,
+        resources: run.resources,
+    })
 }
 
 /// A render that can begin: whatever can be wrong was found.

@@ -196,13 +196,14 @@ fn renders(typed: Vec<OsString>, frames: Option<&Frames>) -> anyhow::Result<(Far
              and give its output folder"
         );
     }
-    let RenderRun { job, resources, out, time, against, earlier, tev, watch, .. } = run;
+    let RenderRun { job, resources, out, time, against, earlier, tev, watch, audit, .. } = run;
     for (option, given) in [
         ("--tev", tev.is_some()),
         ("--watch", watch.is_some()),
         ("--out", out.is_some()),
         ("--time", time.is_some()),
         ("--against", against.is_some()),
+        ("--audit", audit.is_some()),
         ("--resume and --force", earlier != Earlier::Keep),
     ] {
         if given {

@@ -1,5 +1,6 @@
 //! `noisefloor render`.
 
+use super::audit::places;
 use super::verdicts::{CriterionChoice, Preset, VerdictArgs};
 use crate::job::{Autosave, CriterionJob, RenderJob, RenderRun, WatchPage};
 use crate::render::{SequenceExposure, SequenceRun, TEV_ADDRESS, exposure_of};
@@ -95,6 +96,13 @@ pub struct RenderArgs {
     /// No progress bar and no summary.
     #[arg(long, short)]
     quiet: bool,
+    /// Render this many tiles again at the end, with another seed, to four times their samples, and say what the picture has
+    /// lost there: see `noisefloor audit --help`.
+    #[arg(long, value_name = "PLACES", value_parser = places)]
+    audit: Option<usize>,
+    /// With --audit: end with exit code 3 if fewer than 19 of 20 places keep the limit.
+    #[arg(long, requires = "audit")]
+    check: bool,
     /// Render a sequence: frames 1-240, every fifth by 1-100x5, a list as in 1,5,9-12, or -3--1. SCENE holds {frame},
     /// or {frame:04} for four digits, in place of the number (####, %04d and $F4 do, too); so may --against. One file
     /// can hold all frames: {frame} then stands in a value of --define, and a .blend file with --source cycles needs
@@ -346,6 +354,8 @@ impl RenderArgs {
             quiet: self.quiet,
             tev: self.look.tev,
             watch: self.look.watch.map(|address| WatchPage { address, hosts }),
+            audit: self.audit,
+            check: self.check,
         })
     }
 

@@ -1,7 +1,7 @@
 //! image-denoised.exr, image-denoised.png, denoised-error.png, albedo.exr and normal.exr, and what is said
 //! of them.
 
-use super::Output;
+use super::{DENOISED, Output};
 use noisefloor::{Rgb, Session, StoppingCriterion, source::FirstHits};
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_denoise::{Denoiser, Guides, NoisyPicture, compose, spp_without_denoising, stops_err_by};
@@ -114,7 +114,7 @@ impl Output {
         denoised.spp_without =
             spp_without_denoising(session.film(), &display, &image, viewing, denoised.lost);
         denoised.picture_seconds = began.elapsed().as_secs_f64();
-        write_exr(self.path("image-denoised.exr"), &RenderLayers::rgb(width, height, &image))?;
+        write_exr(self.path(DENOISED), &RenderLayers::rgb(width, height, &image))?;
         if let Some((guide, _)) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
             write_exr(self.path("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
             write_exr(self.path("normal.exr"), &RenderLayers::rgb(width, height, &guide.normal))?;

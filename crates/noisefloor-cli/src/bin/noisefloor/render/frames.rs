@@ -8,6 +8,7 @@ use super::frame_report::{FrameRow, read, row};
 use crate::job::{CriterionJob, RenderRun};
 use anyhow::Context;
 use indicatif::HumanDuration;
+use noisefloor_cli::end::ANSWER_IS_NO;
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::signals::{self, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::{note, say};
@@ -75,14 +76,16 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
     };
     let others: Vec<i32> = wanted.into_iter().filter(|frame| !key_frames.contains(frame)).collect();
     let keys_within = key_frames.iter().filter(|frame| frames.contains(**frame)).count();
-    let mut found = Vec::new();
+    let (mut found, mut is_no) = (Vec::new(), false);
     for (index, &frame) in key_frames.iter().chain(&others).enumerate() {
         let folder = out.join(Frames::folder(frame));
         // Whether that is this frame, its own process knows: it reads the scene
         let done = run.earlier == Earlier::Resume && read(&folder).is_some_and(|report| report.complete);
         let status = elsewhere(&sequence.of_frame(frame, &keys)).with_context(|| format!("frame {frame}"))?;
         rendered += u32::from(!done);
-        if !status.success() && status.code() != Some(INTERRUPTED.into()) {
+        let says_no = status.code() == Some(ANSWER_IS_NO.into());
+        is_no |= says_no;
+        if !status.success() && !says_no && status.code() != Some(INTERRUPTED.into()) {
             note!("frame {frame} of {first} to {last} failed; --resume goes on from it");
             return Ok(ExitCode::from(status.code().and_then(|code| code.try_into().ok()).unwrap_or(1)));
         }
@@ -122,7 +125,7 @@ pub fn render_frames(sequence: &SequenceRun) -> anyhow::Result<ExitCode> {
         None if !run.quiet => sum_up(out, &rows)?,
         None => {}
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(if is_no { ExitCode::from(ANSWER_IS_NO) } else { ExitCode::SUCCESS })
 }
 
 /// What is unwise about one seed for all frames.

@@ -9,7 +9,7 @@ use noisefloor::tune::{Knob, Looked, PicturePair, PixelCounts};
 use noisefloor::{Film, Params, ProgressiveSource, Rgb, StoppingCriterion, Tile, TileGrid, ToneMapping};
 use noisefloor_cli::options::tone::Tone;
 use noisefloor_cli::say::note;
-use noisefloor_cli::sources::{Opened, Resources, Source, SourceJob, SourceKind};
+use noisefloor_cli::sources::{Opened, Resources, Source, SourceJob, SourceKind, fill};
 use noisefloor_denoise::{DenoisedError, Denoiser, Guides, NoisyPicture, Oidn};
 use noisefloor_sidecar::{FilterPlan, ThresholdCommand};
 use noisefloor_vision::VisionModel;
@@ -17,8 +17,6 @@ use std::fs::File;
 use std::mem::discriminant;
 use std::time::Duration;
 
-/// Samples per pixel between two looks at the signals.
-const BATCH: u64 = 64;
 /// Most samples per pixel of a program that nobody has told how many.
 const MOST_SPP: u64 = 16_384;
 
@@ -238,25 +236,12 @@ fn grow(
         let along = |a: usize, an: usize, b: usize, bn: usize| a < b + bn && b < a + an;
         along(tile.x, tile.width, part.x, part.width) && along(tile.y, tile.height, part.y, part.height)
     };
-    let tiles: Vec<Tile> = grid.tiles().filter(touches).collect();
-    loop {
-        // Parts may overlap: some tiles have more than others
-        let have = tiles.iter().map(|tile| film.spp(tile.index)).min().unwrap_or(0);
-        let Some(missing) = (2 * each).checked_sub(have).filter(|missing| *missing > 0) else { break };
-        bar.set_message(format!("{have} of {} samples per pixel", 2 * each));
-        // A request belongs to the half with fewer: in pairs, both stay alike
-        let spp = missing.div_ceil(2).min(BATCH);
-        let behind = tiles.iter().filter(|tile| film.spp(tile.index) < 2 * each);
-        let requests: Vec<_> = behind.map(|tile| film.request(tile.index, spp)).collect();
-        for batch in source.sample(&requests)? {
-            if batch.spp == 0 {
-                bail!("the source has no more samples");
-            }
-            film.add(batch.tile.index, batch.spp, &batch.mean)?;
-        }
-    }
+    let tiles: Vec<(Tile, u64)> = grid.tiles().filter(touches).map(|tile| (tile, 2 * each)).collect();
+    fill(source, film, &tiles, |done| {
+        bar.set_message(format!("{:.0} of {} samples per pixel", done * 2.0 * each as f64, 2 * each));
+    })?;
     let mut whole = [0, 1].map(|_| vec![[0.0; 3]; grid.width() * grid.height()]);
-    for tile in tiles {
+    for (tile, _) in tiles {
         for pixel in tile.rows(grid.width()).flatten() {
             let [(a, _), (b, _)] = film.pixel_halves(tile.index, pixel);
             (whole[0][pixel], whole[1][pixel]) = (a, b);
