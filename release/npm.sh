@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes the package for npm from the work tree: release/npm.sh FOLDER [--debian]. The second word goes to
 # build.sh of crates/noisefloor-capi/js. The package is installed into an empty folder at last, and judges a
-# tile there; and into the newest template of Vite, in which TypeScript compiles the README's snippet by strict options.
+# tile there; and into the newest template of Vite, in which TypeScript compiles the README's snippet by strict options, and
+# Chromium shows the package in pages.
 set -euo pipefail
 folder=$(mkdir -p "$1" && cd "$1" && pwd)
 js=$(cd "$(dirname "$0")/../crates/noisefloor-capi/js" && pwd)
@@ -43,4 +44,6 @@ npm install --silent --no-audit --no-fund --ignore-scripts "$folder/$file"
 rm -r src/*
 node "$js/test/readme.mjs" >src/main.ts
 npx tsc --project . --strict --noUncheckedIndexedAccess --exactOptionalPropertyTypes
+npm install --silent --no-audit --no-fund --ignore-scripts playwright-core@1.65.1
+node "$js/test/page.mjs"
 echo "$folder/$file"

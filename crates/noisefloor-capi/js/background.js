@@ -74,7 +74,10 @@ export class BackgroundSession {
     this.#worker = worker;
     this.#onWarning = onWarning;
     const receive = (message) => this.#receive(message);
-    const broken = (error) => this.#fail(new NoisefloorError("INTERNAL", `the worker ended: ${error.message}`));
+    // A browser does not say what it could not load
+    const unsaid = `worker.js of noisefloor, or a module that it imports, cannot be loaded; this one is ${import.meta.url}`;
+    const broken = ({ message }) =>
+      this.#fail(new NoisefloorError(message ? "INTERNAL" : "UNAVAILABLE", message ? `the worker ended: ${message}` : unsaid));
     if (worker.on) worker.on("message", receive).on("error", broken);
     else [worker.onmessage, worker.onerror] = [({ data }) => receive(data), broken];
   }

@@ -20,14 +20,17 @@ if [ "${1-}" = --debian ]; then
     # The linker for WebAssembly is in every toolchain of rustup
     CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(rustc --print sysroot)/lib/rustlib/$host/bin/rust-lld
     export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER
-    if ! [ -x "$unpacked/usr/bin/rustc" ]; then
+    # Unpacked once, the compiler is kept until Debian has another
+    newest=$(apt-cache policy rustc-web | sed -n 's/^ *Candidate: //p')
+    if [ "$(cat "$unpacked/version" 2>/dev/null)" != "$newest" ]; then
         std=$(dependency libstd-rust-web-dev libstd-rust-web-)
         llvm=$(dependency "$std" libllvm)
-        rm -rf "$unpacked" "$unpacked.deb" && mkdir -p "$unpacked.deb"
+        rm -rf "$unpacked" "$unpacked.deb" "$unpacked.part" && mkdir -p "$unpacked.deb"
         (cd "$unpacked.deb" && apt-get download -qq rustc-web rust-web-src libstd-rust-web-dev "$std" "$llvm")
         for package in "$unpacked.deb"/*.deb; do
             dpkg-deb -x "$package" "$unpacked.part"
         done
+        echo "$newest" >"$unpacked.part/version"
         mv "$unpacked.part" "$unpacked"
         rm -r "$unpacked.deb"
     fi

@@ -28,9 +28,15 @@ async function read(source) {
   const url = new URL(source, globalThis.location?.href ?? import.meta.url);
   const files = url.protocol === "file:" && globalThis.process?.getBuiltinModule?.("node:fs/promises");
   if (files) return files.readFile(url);
-  const response = await fetch(url);
-  if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);
-  return response.arrayBuffer();
+  const missing = (why) => new NoisefloorError("UNAVAILABLE", `${url} is not the module of noisefloor: ${why}`);
+  const response = await fetch(url).catch(({ message }) => {
+    throw missing(message);
+  });
+  if (!response.ok) throw missing(`${response.status} ${response.statusText}`);
+  const code = await response.arrayBuffer();
+  // Servers for development answer with a page for what they lack
+  if (!WebAssembly.validate(code)) throw missing(response.headers.get("content-type"));
+  return code;
 }
 
 export function version() {
