@@ -4,7 +4,7 @@ use crate::say::note;
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// What a run does about the work of an earlier one in its output folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +29,20 @@ impl Earlier {
 /// however that ends.
 const LOCK: &str = ".noisefloor.lock";
 
+/// A name in a path that Windows keeps for a device, whatever its ending, or that it would cut short.
+fn reserved(path: &Path) -> Option<String> {
+    path.components()
+        .filter_map(|name| if let Component::Normal(name) = name { name.to_str() } else { None })
+        .find_map(|name| {
+            let stem = name.split('.').next().unwrap_or_default().trim_end().to_ascii_uppercase();
+            let port = ["COM", "LPT"].iter().find_map(|kind| stem.strip_prefix(kind));
+            let is_port =
+                port.is_some_and(|port| port.len() == 1 && ('1'..='9').any(|digit| port.starts_with(digit)));
+            let is_device = is_port || matches!(stem.as_str(), "CON" | "PRN" | "AUX" | "NUL");
+            (is_device || name.ends_with(['.', ' '])).then(|| name.to_owned())
+        })
+}
+
 /// An output folder that no other run writes into as long as this value lives.
 #[derive(Debug)]
 pub struct Folder {
@@ -39,6 +53,9 @@ pub struct Folder {
 impl Folder {
     /// Makes the folder, and locks it.
     pub fn claim(path: PathBuf) -> anyhow::Result<Self> {
+        if let Some(name) = reserved(&path).filter(|_| cfg!(windows)) {
+            bail!("{}: Windows keeps the name {name} for itself; choose another with --out", path.display());
+        }
         std::fs::create_dir_all(&path).with_context(|| {
             format!("{}: this folder cannot be made; choose another with --out", path.display())
         })?;
@@ -68,5 +85,20 @@ impl Folder {
     /// The first of these files that the folder has.
     pub fn first_of<'a>(&self, names: &[&'a str]) -> Option<&'a str> {
         names.iter().copied().find(|name| self.path.join(name).exists())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_windows_keeps_are_known() {
+        for name in ["out/aux", "CON.exr/a", "shots/lpt9.0001", "nul .txt", "out/hall.", "hall "] {
+            assert!(reserved(Path::new(name)).is_some(), "{name}");
+        }
+        for name in ["out/auxiliary", "../console", "com0", "com10", "lpt", "./.hidden", "prn-2", "COMET"] {
+            assert_eq!(reserved(Path::new(name)), None, "{name}");
+        }
     }
 }

@@ -34,7 +34,7 @@ impl JobPath {
     }
 
     /// What is in front of the number of the frame, if there is one place for it.
-    pub(crate) fn before_frame(&self) -> Option<PathBuf> {
+    pub fn before_frame(&self) -> Option<PathBuf> {
         let Placeholder { before, after, kind, .. } = placeholder(self.0.as_os_str().as_encoded_bytes())?;
         kind(after).is_none().then(|| path(before.to_vec()))
     }

@@ -56,7 +56,7 @@ fn pictures() {
         &["judge", text(&a), "--spp", "9", "--against", text(&b), "--spp", "9", "--tile", "0"],
         &["tile", "16…512"],
     );
-    fail(&["judge", text(&a), "--spp", "9"], &["--against"]);
+    fail(&["judge", text(&a), "--spp", "9"], &["a.exr", "one picture", "another seed"]);
     fail(&["judge", text(&a), "--against", text(&b)], &["a.exr", "--spp"]);
     let garbage = case.path("text.exr");
     fail(&["judge", text(&garbage), "--against", text(&b)], &["text.exr: is something else, not an OpenEXR"]);

@@ -3,7 +3,7 @@ use crate::kit::{stderr, succeed};
 // Long: a list of cases
 #[test]
 fn every_subcommand_explains_itself() {
-    let options: [(&str, &[&str]); 8] = [
+    let options: [(&str, &[&str]); 9] = [
         ("farm", &["plan", "run", "merge", "status", "--local", "{frame:04}"]),
         ("reference", &["--out", "--size", "--seed", "--quiet"]),
         (
@@ -30,6 +30,8 @@ fn every_subcommand_explains_itself() {
                 "--against",
                 "--nested",
                 "--json",
+                "--frames",
+                "--check",
                 "--heat-map",
                 "--noise-map",
                 "--exr",
@@ -51,8 +53,9 @@ fn every_subcommand_explains_itself() {
                 "cvvdp_jod",
             ],
         ),
+        ("audit", &["DIR", "--places", "--seed", "--lost", "--check", "--json"]),
         ("inspect", &["MODEL", "--json"]),
-        ("doctor", &["--install", "NOISEFLOOR_NAME_PYTHON"]),
+        ("doctor", &["--install", "--json", "NOISEFLOOR_NAME_PYTHON"]),
         ("scenes", &["--help"]),
     ];
     let all = succeed(&["--help"]);

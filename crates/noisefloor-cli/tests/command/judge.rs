@@ -1,4 +1,4 @@
-use crate::kit::{channel, fail, grey_exr, run, stderr, succeed, text, tiny};
+use crate::kit::{channel, fail, grey_exr, random, run, stderr, succeed, text, tiny};
 use noisefloor_image::{Picture, RenderLayers, SampleFacts, read_exr, read_facts, read_picture, write_exr};
 use serde_json::Value;
 use std::path::PathBuf;
@@ -380,4 +380,58 @@ fn needs_of_less_than_a_sample_are_its_own() {
     };
     let (one, quarter) = (need("1"), need("0.25"));
     assert!(one > 8.0 && (quarter - one / 4.0).abs() <= 1.0, "{one} {quarter}");
+}
+
+/// A pipeline asks by the exit code, also for a sequence, of which the table has the worst place of each frame.
+#[test]
+fn frames_are_judged_and_the_exit_code_tells() {
+    let folder = tempdir().unwrap();
+    let name = |name: &str| folder.path().join(name);
+    let noise = |path: PathBuf, seed: u64, deviation: f64| {
+        let mut random = random(seed);
+        // The lower right tile has twice the noise
+        let pixel = |i: usize| {
+            let noise = random() * if i % 64 > 31 && i > 2048 { 2.0 } else { 1.0 };
+            [(0.4 + deviation * noise) as f32; 3]
+        };
+        let pixels: Vec<[f32; 3]> = (0..64 * 64).map(pixel).collect();
+        write_exr(&path, &RenderLayers::rgb(64, 64, &pixels)).unwrap();
+    };
+    for (frame, deviation) in [(1, 0.0005), (2, 0.01), (3, 0.2)] {
+        noise(name(&format!("a.{frame:04}.exr")), 10 + frame, deviation);
+        noise(name(&format!("b.{frame:04}.exr")), 20 + frame, deviation);
+    }
+    let judge = |names: [&str; 2], more: &[&str]| {
+        let [a, b] = names.map(name);
+        let typed =
+            ["judge", text(&a), text(&b), "--spp", "200", "--spp", "200", "--independent", "--tile", "32"];
+        let output = run(&[&typed[..], more].concat());
+        (output.status.code(), String::from_utf8(output.stdout.clone()).unwrap() + &stderr(&output))
+    };
+    // One picture: 0 unless it is asked for
+    let noisy = ["a.0003.exr", "b.0003.exr"];
+    assert_eq!(judge(noisy, &[]).0, Some(0));
+    assert_eq!(judge(noisy, &["--check"]).0, Some(3));
+    assert_eq!(judge(["a.0001.exr", "b.0001.exr"], &["--check"]).0, Some(0));
+
+    let all = ["a.####.exr", "b.%04d.exr"];
+    let (code, said) =
+        judge(all, &["--frames", "1-3", "--check", "--noise-map", text(&name("map.{frame:04}.png"))]);
+    let rows: Vec<Vec<&str>> = said.lines().skip(1).map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!((code, rows.len()), (Some(3), 3), "{said}");
+    assert_eq!(rows[0][..4], ["1", "4", "of", "4"], "{said}");
+    assert_eq!(rows[2][..6], ["3", "0", "of", "4", "(32,", "32)"], "{said}");
+    assert!((1..4).all(|frame| name(&format!("map.{frame:04}.png")).is_file()));
+    let frames: Vec<Value> = serde_json::from_str(&judge(all, &["--frames", "1,3", "--json"]).1).unwrap();
+    let told =
+        |row: &Value| (row["frame"].as_i64(), row["converged_tiles"].as_u64(), row["worst"]["x"].as_u64());
+    assert_eq!(frames.len(), 2);
+    assert_eq!(told(&frames[1]), (Some(3), Some(0), Some(32)));
+    assert!(frames[1]["worst"]["probability"].as_f64() < frames[0]["worst"]["probability"].as_f64());
+    assert_eq!(judge(all, &["--frames", "1", "--check"]).0, Some(0));
+
+    let (code, said) = judge(["a.0001.exr", "b.####.exr"], &["--frames", "1-3"]);
+    assert!(code == Some(2) && said.contains("a.0001.exr' does not say where the number"), "{said}");
+    let (code, said) = judge(all, &["--frames", "3-4"]);
+    assert!(code == Some(1) && said.contains("frame 4: ") && said.contains("a.0004.exr"), "{said}");
 }

@@ -108,6 +108,10 @@ fn the_doctor_says_what_is_missing() {
     let (code, said) = doctor(Some("/no/such/python"), &["doctor"]);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("/no/such/python") && said.contains("NOISEFLOOR_MITSUBA_PYTHON"), "{said}");
+    let (code, said) = doctor(None, &["doctor", "--json"]);
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&said).unwrap();
+    assert!(code == Some(0) && rows[0]["renderer"] == "ptwne" && rows[0]["usable"] == true, "{said}");
+    assert!(rows.iter().any(|row| row["renderer"] == "mitsuba" && row["usable"] == false), "{said}");
     let (code, said) = doctor(None, &["render", "--source", "mitsuba", CORNELL_BOX]);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("noisefloor doctor --install mitsuba") && said.lines().count() == 1, "{said}");

@@ -1,6 +1,7 @@
 //! `noisefloor judge`.
 
 mod denoised;
+mod frames;
 mod read;
 mod report;
 
@@ -8,21 +9,26 @@ pub use denoised::DenoisedJob;
 pub use read::warn_unread;
 
 use anyhow::Context;
+use frames::{Judged, Place};
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     evidence::{Evidence, Samples},
     stills::{JudgedTiles, SnapshotPair, Still, StillError},
 };
+use noisefloor_cli::end::ANSWER_IS_NO;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::start_threads;
+use noisefloor_farm::Frames;
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
 use noisefloor_image::{Plane, ReadOptions, RenderLayers, SampleFacts, check_writable, write_exr};
 use read::{read, warn_of};
 use report::Row;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 /// Pictures to judge: checked.
+#[derive(Clone)]
 pub struct JudgeJob {
     /// With its samples per pixel; without them, the file says how many.
     pub image: (PathBuf, Option<f64>),
@@ -51,19 +57,38 @@ pub enum Question {
     Denoised(Box<DenoisedJob>),
 }
 
-pub fn run(question: &Question) -> anyhow::Result<()> {
-    let threads = match question {
-        Question::Noise(job) => job.threads,
-        Question::Denoised(job) => job.threads,
+/// Pictures, or those of all frames of a sequence, and whether the exit code tells.
+pub struct Judging {
+    pub question: Question,
+    pub frames: Option<Frames>,
+    pub check: bool,
+}
+
+pub fn run(judging: &Judging) -> anyhow::Result<ExitCode> {
+    let Judging { question, frames, check } = judging;
+    let (threads, json) = match question {
+        Question::Noise(job) => (job.threads, job.json),
+        Question::Denoised(job) => (job.threads, job.json),
     };
     start_threads(threads)?;
-    match question {
-        Question::Noise(job) => judge_noise(job),
-        Question::Denoised(job) => denoised::run(job),
+    let is_converged = match frames {
+        Some(frames) => frames::run(question, frames, json)?,
+        None => question.judge(true)?.is_converged(),
+    };
+    Ok(if *check && !is_converged { ExitCode::from(ANSWER_IS_NO) } else { ExitCode::SUCCESS })
+}
+
+impl Question {
+    /// Judges, and draws what was asked for; `says` all of it.
+    fn judge(&self, says: bool) -> anyhow::Result<Judged> {
+        match self {
+            Self::Noise(job) => judge_noise(job, says),
+            Self::Denoised(job) => denoised::run(job, says),
+        }
     }
 }
 
-fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
+fn judge_noise(job: &JudgeJob, says: bool) -> anyhow::Result<Judged> {
     for path in [&job.heat_map, &job.noise_map, &job.exr].into_iter().flatten() {
         check_writable(path)?;
     }
@@ -96,8 +121,15 @@ fn judge_noise(job: &JudgeJob) -> anyhow::Result<()> {
         error => error.into(),
     })?;
     let rows = rows(grid, image.spp, &judged, &unlike);
-    report::say_all(&job.image.0, image.spp, &job.oracle, &rows, job.json)?;
-    draw(job, &image, grid, &held, &judged, &rows)
+    if says {
+        report::say_all(&job.image.0, image.spp, &job.oracle, &rows, job.json)?;
+    }
+    draw(job, &image, grid, &held, &judged, &rows)?;
+    let place = |row: &Row| {
+        let Row { x, y, width, height, probability, .. } = *row;
+        (row.converged, Place { x, y, width, height, probability: Some(probability), jods_lost: None })
+    };
+    Ok(Judged::new(rows.iter().map(place)))
 }
 
 /// The verdicts; tiles that are `unlike` in both pictures get none, and count as not converged.

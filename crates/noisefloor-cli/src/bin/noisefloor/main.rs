@@ -41,7 +41,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Farm(args) => farm::run(args.check()?),
         Command::Audit(args) => audit::run(&args.check()?),
         Command::Reference(args) => reference::run(args.check()?),
-        Command::Judge(args) => judge::run(&args.check()?).map(done),
+        Command::Judge(args) => judge::run(&args.check()?),
         Command::Metrics(args) => metrics::run(&args.check()?).map(done),
         Command::Inspect(args) => inspect::run(&args.check()?).map(done),
         Command::Scenes { command: None } => Ok(inspect::scenes().map(done)?),

@@ -20,6 +20,9 @@ pub struct DoctorArgs {
     /// Install this renderer or denoiser, if it is not there yet.
     #[arg(long, value_name = "NAME", value_parser = installable, value_hint = ValueHint::Other)]
     install: Option<&'static Renderer>,
+    /// Print JSON instead of a table.
+    #[arg(long, conflicts_with = "install")]
+    json: bool,
 }
 
 fn installable(text: &str) -> Result<&'static Renderer, String> {
@@ -35,6 +38,6 @@ fn installable(text: &str) -> Result<&'static Renderer, String> {
 
 impl DoctorArgs {
     pub fn check(self) -> DoctorJob {
-        DoctorJob { install: self.install }
+        DoctorJob { install: self.install, json: self.json }
     }
 }

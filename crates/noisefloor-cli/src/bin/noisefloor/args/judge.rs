@@ -1,6 +1,6 @@
 //! `noisefloor judge`.
 
-use crate::judge::{DenoisedJob, JudgeJob, Question};
+use crate::judge::{DenoisedJob, JudgeJob, Judging, Question};
 use clap::Args;
 use noisefloor::{
     Audience,
@@ -14,7 +14,9 @@ use noisefloor_cli::options::tone::ToneArgs;
 use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
 use noisefloor_cli::refuse;
+use noisefloor_cli::spell::JobPath;
 use noisefloor_denoise::DEFAULT_JODS_LOST;
+use noisefloor_farm::Frames;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -38,7 +40,8 @@ use std::path::PathBuf;
   noisefloor judge 00100.png --spp 100 --against 00900.png --spp 900 --nested --heat-map verdict.png
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --noise-map noise.png
   noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --denoised a-denoised.exr b-denoised.exr
-  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json")]
+  noisefloor judge a.exr --spp 64 --against b.exr --spp 64 --json > verdicts.json
+  noisefloor judge a.####.exr b.####.exr --spp 64 --spp 64 --frames 1-240 --check     a line a frame; exit code 3 if noise is seen")]
 pub struct JudgeArgs {
     /// Picture to judge, PNG or EXR.
     #[arg(value_name = "IMAGE")]
@@ -51,7 +54,7 @@ pub struct JudgeArgs {
     #[arg(value_name = "AGAINST")]
     others: Vec<PathBuf>,
     /// Another rendering of the same view. Repeat for more.
-    #[arg(long, required_unless_present = "others", value_name = "IMAGE")]
+    #[arg(long, value_name = "IMAGE")]
     against: Vec<PathBuf>,
     #[command(flatten)]
     layer: LayerArgs,
@@ -84,6 +87,13 @@ pub struct JudgeArgs {
     /// Threads [default: one a core].
     #[arg(long, value_name = "N", value_parser = values::threads)]
     threads: Option<NonZeroUsize>,
+    /// Judge the frames of a sequence, 1-240 or 1,5,9-12, and say of each how many tiles have converged, and which is worst.
+    /// The names of pictures and maps hold {frame}, #### or %04d in place of the number.
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    frames: Option<Frames>,
+    /// End with exit code 3 if a tile has not converged.
+    #[arg(long)]
+    check: bool,
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
@@ -100,13 +110,33 @@ pub struct JudgeArgs {
 }
 
 impl JudgeArgs {
-    pub fn check(mut self) -> anyhow::Result<Question> {
+    pub fn check(mut self) -> anyhow::Result<Judging> {
         // In the order in which --spp counts them
         self.against.splice(..0, std::mem::take(&mut self.others));
-        match <[PathBuf; 2]>::try_from(self.denoised.clone()) {
-            Ok(denoised) => self.check_denoised(denoised).map(|job| Question::Denoised(Box::new(job))),
-            Err(_) => self.check_noise().map(|job| Question::Noise(Box::new(job))),
+        if self.against.is_empty() {
+            refuse!(
+                "{}: one picture does not tell noise from texture, and what renderers write of samples or variance beside it \
+                 does not say how visible it is; render the view again with another seed, and name that picture, too",
+                self.image.display()
+            );
         }
+        let (frames, check) = (self.frames.take(), self.check);
+        if frames.is_some() {
+            let maps = [&self.heat_map, &self.noise_map, &self.exr].into_iter().flatten();
+            let mut names =
+                std::iter::once(&self.image).chain(&self.against).chain(&self.denoised).chain(maps);
+            if let Some(name) = names.find(|name| JobPath::from(*name).before_frame().is_none()) {
+                refuse!(
+                    "--frames: '{}' does not say where the number of the frame stands: write #### there",
+                    name.display()
+                );
+            }
+        }
+        let question = match <[PathBuf; 2]>::try_from(self.denoised.clone()) {
+            Ok(denoised) => Question::Denoised(Box::new(self.check_denoised(denoised)?)),
+            Err(_) => Question::Noise(Box::new(self.check_noise()?)),
+        };
+        Ok(Judging { question, frames, check })
     }
 
     fn check_denoised(self, denoised: [PathBuf; 2]) -> anyhow::Result<DenoisedJob> {

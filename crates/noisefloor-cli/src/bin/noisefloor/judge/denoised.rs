@@ -1,5 +1,6 @@
 //! Denoised pictures made elsewhere.
 
+use super::frames::{Judged, Place};
 use super::read::{read, warn_of};
 use anyhow::{Context, bail};
 use noisefloor::{
@@ -17,6 +18,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 /// Two halves, and what a denoiser has made of each.
+#[derive(Clone)]
 pub struct DenoisedJob {
     /// With their samples per pixel; without them, the files say how many.
     pub noisy: [(PathBuf, Option<f64>); 2],
@@ -57,7 +59,7 @@ struct Report<'a> {
     tiles: &'a [Row],
 }
 
-pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
+pub(super) fn run(job: &DenoisedJob, says: bool) -> anyhow::Result<Judged> {
     job.noise_map.iter().try_for_each(check_writable)?;
     let options = ReadOptions { viewing: job.viewing, layer: job.layer.clone(), ..ReadOptions::default() };
     let [a, b] = [read(&job.noisy[0], &options)?, read(&job.noisy[1], &options)?];
@@ -93,13 +95,19 @@ pub fn run(job: &DenoisedJob) -> anyhow::Result<()> {
     let film = pair.film(TileGrid::new(size.0, size.1, job.tile)?);
     let unmet = film.map_or_else(Vec::new, |film| jods_lost_unmet(&film, pair.display(), &job.viewing));
     let rows = judge(job, &error, &unmet)?;
-    say_all(job, &rows)?;
+    if says {
+        say_all(job, &rows)?;
+    }
     if let Some(path) = &job.noise_map {
         let shown: Vec<Rgb> = error.shown().iter().map(|&shown| [shown; 3]).collect();
         let map = error.map_of_jods_lost(&VisionModel::new(&job.viewing))?;
         draw_field(&Canvas::of_picture(size.0, &shown), &map, &crate::output::ERROR_SCALE).save(path)?;
     }
-    Ok(())
+    let place = |row: &Row| {
+        let Row { x, y, width, height, jods_lost, .. } = *row;
+        (row.converged, Place { x, y, width, height, probability: None, jods_lost: Some(jods_lost) })
+    };
+    Ok(Judged::new(rows.iter().map(place)))
 }
 
 /// What a denoiser has made of a picture.
