@@ -102,12 +102,12 @@ test("whoever asks renders nothing beyond the limit", async () => {
 });
 
 test("half floats are read in the worker, and integers are refused", async () => {
-  // Halves of 0.25 to 0.5, whose steps are 1/4096
+  // Of several exponents: those of one are integers over a power of two, which are refused
   const bits = (seed) => {
     const random = noise(seed);
-    return Uint16Array.from({ length: 3 * width * height }, () => 0x3400 + Math.floor(512 + 500 * random()));
+    return Uint16Array.from({ length: 3 * width * height }, () => 0x3000 + Math.floor(0xbff * random()));
   };
-  const value = (bit) => 0.25 + (bit - 0x3400) / 4096;
+  const value = (bit) => 2 ** ((bit >> 10) - 25) * (1024 + (bit & 1023));
   for (const whenFull of ["wait", "merge"]) {
     const session = await BackgroundSession.open(width, height, { tile: 32, whenFull, linear: true });
     const pushed = [];

@@ -81,7 +81,8 @@ test("curves reach the session", async () => {
     session.close();
     return probability;
   };
-  const darkest = spread({ curve: "aces", exposure: 0.01 });
+  // Where it is darker still, light may lack that few samples meet
+  const darkest = spread({ curve: "aces", exposure: 0.1 });
   for (const curve of ["linear", ...Object.keys(curves)]) {
     const probability = spread({ curve, exposure: 1 });
     assert.ok(probability < darkest, `${curve}: ${probability} ${darkest}`);
