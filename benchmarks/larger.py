@@ -21,8 +21,12 @@ import numpy as np
 LIMIT, LEAST, DECAY = 0.3, 1e-3, 0.38
 # Tiles whose reference has itself lost as much are left out
 NOISY_REFERENCE = 0.1
-# The rule: power, step, margin from 16 tiles on; and the margin of each tile to the limit
-TOGETHER, STEP, MARGIN, BEFORE = 0.72, 1.2, 1.1, 1.5
+# The rule: power, step, medians that the hardest counts as at most, margin from 16 tiles on, the least that an estimate counts as, and
+# the powers of an estimate, of earlier ones, and of those around it; and the margin of each tile to the limit
+TOGETHER, STEP, MEDIANS, MARGIN, FLOOR, BEFORE = 0.85, 1.2, 8, 1.2, 1 / 4, 1.5
+OWN, EARLIER, AROUND = 0.4, 0.3, 0.3
+# The schedule: samples that counts are multiples of, and how much they grow at the least and at the most
+GRID, GROWS = 16, (1.5, 4)
 # What verdicts count the mean of four as
 GAIN = 0.97
 SIZE, TILE = (240, 135), 32
@@ -206,35 +210,64 @@ class Outcome:
         return self.done[self.picture.good]
 
 
-def play(estimate, first, limit, power, spp, share=1):
-    """The rule as it runs, in one picture of tiles × levels: the last level of each tile, and whether it was satisfied there.
-    The last of `spp` is what tiles count that are never satisfied; others are drawn to what this share of them needs."""
-    last = len(spp) - 1
-    levels = np.full(len(estimate), np.searchsorted(spp, first))
-    need, fresh = np.full(len(estimate), -1), np.ones(len(estimate), bool)
+def neighbours(tile):
+    across, down = len(places(SIZE[0])), len(places(SIZE[1]))
+    y, x = divmod(tile, across)
+    near = lambda at, count: range(max(at - 1, 0), min(at + 2, count))
+    return [j * across + i for j in near(y, down) for i in near(x, across) if (i, j) != (x, y)]
+
+
+def play(picture, first=16, margin=MARGIN, power=TOGETHER, powers=(OWN, EARLIER, AROUND), most=MEDIANS):
+    """The rule as it runs, with its schedule: the last level of each tile, whether it was satisfied, and whether by its noise.
+    The last of the levels is what tiles count that are never satisfied."""
+    spp, limit, (own, earlier, around) = above(picture), LIMIT / margin, powers
+    last, tiles = len(spp) - 1, np.arange(len(picture.reference))
+    said = np.log(np.maximum(GAIN * picture.estimate, FLOOR * LIMIT / MARGIN)) + DECAY * np.log(picture.spp)[:, None]
+    at_one, undenoised = np.full(len(tiles), np.nan), np.zeros(len(tiles), bool)
+    levels, need, looked, verdicts = np.full(len(tiles), np.searchsorted(spp, first)), np.full(len(tiles), -1), tiles, 0
     while True:
-        for i in np.flatnonzero(fresh):
-            satisfied = levels[i] < last and estimate[i, levels[i]] <= limit
-            need[i] = (need[i] if need[i] >= 0 else levels[i]) if satisfied else -1
-        done = need >= 0
-        most = np.quantile(np.where(done, spp[need], spp[levels]), share, method="higher")
-        wanted = spp[np.maximum(need, 0)] ** power * most ** (1 - power)
-        fresh = (levels < last) & (~done | (wanted >= STEP * spp[levels]))
-        if not fresh.any():
-            return levels, done
-        levels = levels + fresh
+        looked = np.array([i for i in looked if need[i] < 0 and levels[i] < last], int)
+        verdicts += len(looked) > 0
+        new = said[levels[looked], looked]
+        at_one[looked] = np.where(np.isnan(at_one[looked]), new, (own * new + earlier * at_one[looked]) / (own + earlier))
+        expected = 0.0 * tiles
+        for i in looked:
+            n, near = picture.spp[levels[i]], at_one[neighbours(i)]
+            pooled = (own + earlier) * at_one[i] + around * near[~np.isnan(near)].mean()
+            own_estimate, noise = GAIN * picture.estimate[levels[i], i], picture.noise[levels[i], i]
+            lost = own_estimate if own_estimate < FLOOR * LIMIT / MARGIN else np.exp(pooled - DECAY * np.log(n))
+            dark, undenoised[i] = picture.unmet[levels[i], i] > LIMIT, lost > limit
+            need[i] = levels[i] if min(lost, noise) <= limit and not dark else -1
+            expected[i] = 2 * n if dark else n * min((lost / limit) ** (1 / DECAY), (noise / limit) ** 2)
+        needs = np.where(need >= 0, spp[need], spp[levels])
+        hardest = min(needs.max(), most * np.sort(needs)[len(needs) // 2])
+        wanted = np.maximum(needs, needs**power * hardest ** (1 - power))
+        go = (levels < last) & ((need < 0) | (wanted >= STEP * spp[levels]))
+        if not go.any():
+            return levels, need >= 0, undenoised, verdicts
+        for i in np.flatnonzero(go):
+            n = spp[levels[i]]
+            missing = np.ceil((wanted if need[i] >= 0 else expected)[i] / GRID) * GRID - n
+            grown = n + np.clip(max(min(GRID / go.mean(), n), missing), (GROWS[0] - 1) * n, (GROWS[1] - 1) * n)
+            levels[i] = min(max(np.searchsorted(spp, grown // GRID * GRID), levels[i] + 1), last)
+        looked = np.flatnonzero(go)
 
 
-def ours(picture, first=32, margin=MARGIN, power=TOGETHER):
-    says, limit = picture.says(), LIMIT / margin
-    levels, done = play(says.T, first, limit, power, above(picture))
+def ours(picture, **how):
+    levels, done, undenoised, _ = play(picture, **how)
+    return Outcome(picture, levels, done, done & undenoised)
+
+
+def each(picture):
+    """Each tile to the limit, with the margin that one estimate needs."""
+    levels = first_below(picture.says(), LIMIT / BEFORE, 48, picture.spp)
     here = np.minimum(levels, len(picture.spp) - 1), np.arange(len(levels))
-    return Outcome(picture, levels, done, done & (GAIN * picture.estimate[here] > limit))
+    return Outcome(picture, levels, undenoised=GAIN * picture.estimate[here] > LIMIT / BEFORE)
 
 
 def together(picture):
     """One count for all, where all tiles are satisfied."""
-    passed = (picture.says() <= LIMIT / MARGIN).all(1) & (picture.spp >= 32)
+    passed = (picture.says() <= LIMIT / MARGIN).all(1) & (picture.spp >= 16)
     return Outcome(picture, np.full(len(picture.reference), passed.argmax() if passed.any() else len(picture.spp)))
 
 
@@ -260,8 +293,8 @@ def hindsight(scenes, rule):
 
 def rules(scenes):
     """Every rule in every picture, by its name."""
-    before = lambda picture: ours(picture, 48, BEFORE, 1)
-    every = {"ours": ours, "before: each to the limit, ×1.5, from 48": before, "one count, when all are satisfied": together}
+    alone = lambda picture: ours(picture, powers=(1, 0, 0))
+    every = {"ours": ours, "ours, each estimate by itself": alone, "each to the limit, ×1.5, from 48": each, "one count, when all are satisfied": together}
     found = {label: {scene: [rule(p) for p in pictures] for scene, pictures in scenes.items()} for label, rule in every.items()}
     for rule in RULES:
         best = hindsight(scenes, rule)

@@ -5,7 +5,7 @@ use crate::estimate::{DenoisedError, DenoisedHalves, ESTIMATE_ERRS_BY, PartError
 use crate::guides::Guides;
 use crate::mirrored::DenoisePasses;
 use crate::parts::{holds, parts_around, within};
-use crate::record::{Done, Record};
+use crate::record::{DENOISED_DECAY, Done, Record};
 use crate::unmet::unmet_error;
 use noisefloor::{
     Film, Rgb, StoppingCriterion, Tile, TileGrid, Verdict, Viewing,
@@ -24,22 +24,24 @@ const AT_MOST: &str = "at most ";
 const JOD_LOST: &str = " JOD lost after ";
 /// A tile with more than one in this many pixels without valid samples gives no evidence.
 const NO_EVIDENCE: usize = 16;
-/// What is wrong with a picture is n^−DECAY of n samples: of noise, and of what Open Image Denoise makes of it
-/// (`docs/denoising.md`).
+/// Noise is n^−DECAY of n samples.
 const DECAY: f64 = 0.5;
-const DENOISED_DECAY: f64 = 0.38;
 /// Light that few samples have met is spread over ever more finds.
 const UNMET_DECAY: f64 = 1.0;
-/// A tile that needs n samples takes n^TOGETHER · N^(1 − TOGETHER), where the hardest so far needs N, if these are so many
-/// times more than it has (`docs/benchmarks/denoised.md`).
-const TOGETHER: f64 = 0.72;
+/// A tile that needs n samples takes n^TOGETHER · N^(1 − TOGETHER), where the hardest so far needs N, but at most so many times
+/// what the median tile does, if these are so many times more than it has.
+const TOGETHER: f64 = 0.85;
+const MOST_MEDIANS: f64 = 8.0;
 const TOGETHER_STEP: f64 = 1.2;
-/// From so many tiles on, counts that are drawn together make up for most of what estimates err by, and this is left of the
-/// margin: [`stops_err_by`].
+/// An estimate below this share of the limit is taken by itself, and counts as so much beside others: where nothing is lost, it says
+/// little of what is lost around it.
+const LEAST: f64 = 0.25;
+/// From so many tiles on, estimates that are pooled and counts that are drawn together make up for most of what estimates err
+/// by, and this is left of the margin: [`stops_err_by`].
 const COMPANY: usize = 16;
-const ERR_BY_IN_COMPANY: f64 = 1.1;
+const ERR_BY_IN_COMPANY: f64 = 1.2;
 /// JODs that a tile may lose, unless one says otherwise. Where people stopped seeing *noise*, zones had lost as much,
-/// on average over the human data; 0.08 to 0.38 by scene (`docs/benchmarks/stops.md`).
+/// on average over the human data; 0.08 to 0.38 by scene.
 pub const DEFAULT_JODS_LOST: f64 = 0.3;
 /// Edge of the square that a smaller tile is judged in, in pixels: as [`noisefloor::tune::PicturePair::squares`].
 const SQUARE: usize = 64;
@@ -53,19 +55,21 @@ const CONTRAST_TOLERANCE: f64 = 1.05;
 /// The two halves of the film are denoised apart, whole, and [`DenoisedError`] says how wrong the denoised
 /// picture is; the vision model says how many just-objectionable differences (JOD) each tile has lost by that. A tile with
 /// a side of less than 64 pixels is also done when the square of 64 pixels around it is: the smaller the tiles, the
-/// fewer samples go to where nothing asks for them (`docs/benchmarks/stops.md`).
+/// fewer samples go to where nothing asks for them.
 ///
 /// A tile is also done when its noise, as rendered, has lost as little: denoisers smear some details however many samples
 /// they are given. [`Verdict::undenoised`] says so, and [`compose`](crate::compose) shows such tiles as they were rendered.
 ///
-/// Counts are drawn together: a tile that is satisfied goes on being sampled, a little, and is judged again, while others need
-/// far more. For the same promise, this takes about as many samples, and leaves less in the mean (`docs/benchmarks/denoised.md`).
+/// An estimate is pooled with earlier ones of the tile, and with those of the tiles around it. And counts are drawn together: a tile
+/// that is satisfied goes on being sampled, a little, while others need far more; it is not looked at again. For the same promise,
+/// this leaves less in the mean.
 ///
 /// A tile stays open as long as it is likely to lack light that few samples have met ([`Verdict::open_for`]), and that would by itself
 /// lose more than the limit where it fell on a plain field as bright as the tile: a denoiser takes lone finds for noise, and removes
 /// them. What is found later opens tiles again that had stopped.
 ///
-/// A verdict takes two denoisings, of the whole picture or, where the denoiser can do that, of what lies around open tiles: use a
+/// A verdict takes two denoisings, of the whole picture or, where the denoiser can do that, of what lies around tiles that are not
+/// satisfied yet, and none where all are: use a
 /// schedule with growing intervals, such as
 /// [`Schedule::Growing`](noisefloor::Schedule::Growing).
 ///
@@ -163,18 +167,21 @@ impl<D: Denoiser> DenoisedQuality<D> {
 }
 
 /// Of tiles that stop by [`DenoisedQuality`], in a picture of so many, 19 of 20 have lost less than so many times as much as
-/// was estimated when they stopped (`docs/denoising.md`). A tile stops where its estimate errs to the low side; in a large
-/// picture, where others go on, it is looked at again.
+/// was estimated when they stopped. A tile stops where its estimate errs to the low side; in a large
+/// picture, it is pooled with others, and most tiles go on beside those that need more.
 pub fn stops_err_by(tiles: usize) -> f64 {
     if tiles < COMPANY { ESTIMATE_ERRS_BY } else { ERR_BY_IN_COMPANY }
 }
 
-/// The samples per pixel that tiles are to have, from those that each needs by itself. Needs are estimates: where they are
-/// low by chance, the power makes up for some of it. And what denoisers leave falls as n^−[`DENOISED_DECAY`], so that the
-/// same samples lose least in the mean as the 0.72th power of what brings all to one limit.
+/// The samples per pixel that tiles are to have, from those that each needs by itself: no fewer. Needs are estimates: where they
+/// are low by chance, the power makes up for some of it. What one tile lacks lifts the others no further than what [`MOST_MEDIANS`]
+/// bounds.
 fn drawn_together(needs: &[f64]) -> Vec<f64> {
-    let most = needs.iter().copied().fold(0.0, f64::max);
-    needs.iter().map(|need| need.powf(TOGETHER) * most.powf(1.0 - TOGETHER)).collect()
+    let mut sorted = needs.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (Some(median), Some(most)) = (sorted.get(sorted.len() / 2), sorted.last()) else { return sorted };
+    let most = most.min(MOST_MEDIANS * median);
+    needs.iter().map(|need| need.max(need.powf(TOGETHER) * most.powf(1.0 - TOGETHER))).collect()
 }
 
 /// The two halves of a film, row-major; where one has no valid sample, it shows the other.
@@ -237,34 +244,64 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
         if self.record.done.len() != grid.len() {
             self.begin(grid);
         }
-        let parts = parts_around(tiles, view.film.grid().size());
-        let errors = self.estimate(view, &parts)?;
+        // What a verdict would say of a satisfied tile that has more samples is known, unless it is displayed otherwise
+        let exposure = view.display.exposure();
+        let known = |tile: &Tile| self.record.done[tile.index].is_some_and(|done| done.ahead);
+        let moved = self.record.exposure != exposure;
+        let looked: Vec<Tile> = tiles.iter().filter(|tile| moved || !known(tile)).copied().collect();
+        let parts = parts_around(&looked, grid.size());
+        let errors = if looked.is_empty() { Vec::new() } else { self.estimate(view, &parts)? };
+        self.record.exposure = exposure;
         let eyes = VisionModel::new(&view.viewing);
         // An exposure that is estimated adds to what estimates err by, which 19 of 20 do by 1.645 deviations at most; what is
         // seen grows with it, at most
         let err_by = stops_err_by(grid.len()).ln().hypot(1.645 * view.exposure_error).exp();
         let limits = [self.lost / err_by, self.lost / stops_err_by(grid.len())];
         let unmet = Unmet::of(view.film, view.display, view.viewing);
-        let mut verdicts: Vec<Verdict> = tiles
+        let found: Vec<(&PartError, (Tile, u64, f64))> = looked
             .par_iter()
             .map_init(VisionWorkspace::default, |room, &tile| {
+                let here = errors.iter().find(|(part, _)| holds(*part, tile))?;
                 let eyes = &mut Eyes { model: &eyes, room };
-                let here = errors.iter().find(|(part, _)| holds(*part, tile));
-                let verdict = here.map(|here| judge_tile(view, here, tile, limits, eyes))?;
-                let dark =
-                    if verdict.converged { darkness(view, &unmet, tile, self.lost, eyes) } else { None };
-                let kind = unmet.kind(view.film, tile);
-                Some(dark.map_or(verdict, |expected| verdict.kept_open_by(kind).expecting(expected)))
+                let (_, lost) = judged_by(&here.1, within(tile, here.0), eyes);
+                Some((here, (tile, view.film.spp(tile.index), lost)))
             })
             .collect::<Option<_>>()
             .expect("each tile is in a part");
+        let least = LEAST * limits[1];
+        let at_least: Vec<_> =
+            found.iter().map(|&(_, (tile, spp, lost))| (tile, spp, lost.max(least))).collect();
+        let pooled = self.record.pool(grid, &at_least);
+        let verdicts: Vec<Verdict> = found
+            .par_iter()
+            .zip(pooled)
+            .map_init(VisionWorkspace::default, |room, (&(here, (tile, _, own)), pooled)| {
+                let eyes = &mut Eyes { model: &eyes, room };
+                let lost = if own < least { own } else { pooled };
+                let verdict = judge_tile(view, here, (tile, lost), limits, eyes);
+                let dark =
+                    if verdict.converged { darkness(view, &unmet, tile, self.lost, eyes) } else { None };
+                let kind = unmet.kind(view.film, tile);
+                dark.map_or(verdict, |expected| verdict.kept_open_by(kind).expecting(expected))
+            })
+            .collect();
 
+        let mut said: Vec<Option<Verdict>> = vec![None; grid.len()];
+        for (tile, verdict) in looked.iter().zip(verdicts) {
+            let (lost, undenoised) = (verdict.lost.unwrap_or_default(), verdict.undenoised);
+            let spp = self.record.done[tile.index].map_or(view.film.spp(tile.index), |before| before.spp);
+            let done = Done { lost, undenoised, spp, ahead: false };
+            self.record.done[tile.index] = verdict.converged.then_some(done);
+            said[tile.index] = Some(verdict);
+        }
         // Of tiles that were done, what has been found elsewhere since can say that they lack it
-        let before: Vec<Option<Done>> =
-            tiles.iter().map(|tile| self.record.done[tile.index].take()).collect();
-        let earlier: Vec<(Tile, Done)> =
-            grid.tiles().filter_map(|tile| Some((tile, self.record.done[tile.index]?))).collect();
-        self.revised = earlier
+        let of_done = |tile: &Tile| Some((*tile, self.record.done[tile.index]?));
+        let earlier: Vec<(Tile, Done)> = grid
+            .tiles()
+            .filter(|tile| said[tile.index].is_none())
+            .filter_map(|tile| of_done(&tile))
+            .collect();
+        let dark: Vec<(Tile, Verdict)> = earlier
             .par_iter()
             .map_init(VisionWorkspace::default, |room, &(tile, done)| {
                 let expected = darkness(view, &unmet, tile, self.lost, &mut Eyes { model: &eyes, room })?;
@@ -273,28 +310,29 @@ impl<D: Denoiser> StoppingCriterion for DenoisedQuality<D> {
             })
             .flatten()
             .collect();
-        self.revised.iter().for_each(|(tile, _)| self.record.done[tile.index] = None);
-        for ((tile, verdict), before) in tiles.iter().zip(&verdicts).zip(before) {
-            let (lost, undenoised) = (verdict.lost.unwrap_or_default(), verdict.undenoised);
-            let spp = before.map_or(view.film.spp(tile.index), |before| before.spp);
-            self.record.done[tile.index] = verdict.converged.then_some(Done { lost, undenoised, spp });
+        for (tile, verdict) in dark {
+            (self.record.done[tile.index], said[tile.index]) = (None, Some(verdict));
         }
         // Who is satisfied goes on beside those that are not
-        let together = self.together(view.film);
-        for (tile, verdict) in tiles.iter().zip(&mut verdicts) {
-            if let Some(spp) = together[tile.index] {
-                *verdict = verdict.kept_open_by(OpenFor::Noise).expecting(Some(spp));
-            }
-        }
         let mut asked = vec![false; grid.len()];
         tiles.iter().for_each(|tile| asked[tile.index] = true);
-        let others = grid.tiles().filter(|tile| !asked[tile.index]);
-        self.revised.extend(others.filter_map(|tile| {
-            let (spp, done) = (together[tile.index]?, self.record.done[tile.index]?);
-            Some((tile, Verdict::new(false).with_loss(done.lost, done.undenoised).expecting(Some(spp))))
-        }));
-        self.record.renew(grid.width(), &errors, tiles, &eyes);
-        Ok(verdicts)
+        for (index, together) in self.together(view.film).into_iter().enumerate() {
+            let Some(done) = &mut self.record.done[index] else { continue };
+            done.ahead = together.is_some() || (done.ahead && !asked[index]);
+            let satisfied = Verdict::new(true).with_loss(done.lost, done.undenoised);
+            let verdict = said[index].unwrap_or(satisfied.expecting(Some(done.spp)));
+            said[index] = Some(match together {
+                Some(spp) => verdict.kept_open_by(OpenFor::Noise).expecting(Some(spp)),
+                None => verdict,
+            });
+        }
+        self.record.renew(grid.width(), &errors, &looked, &eyes);
+        let answers =
+            tiles.iter().map(|tile| said[tile.index].take().expect("it was looked at, or is known"));
+        let answers = answers.collect();
+        let open = |tile: Tile| Some((tile, said[tile.index].filter(|verdict| !verdict.converged)?));
+        self.revised = grid.tiles().filter_map(open).collect();
+        Ok(answers)
     }
 
     fn revised(&mut self) -> Vec<(Tile, Verdict)> {
@@ -340,31 +378,18 @@ impl Eyes<'_> {
         }
         Some((spp as f64 * low.powf(-1.0 / decay)).clamp(1.0, 1e15).ceil() as u64)
     }
-
-    /// The samples per pixel at which one of both, what is wrong with the denoised picture and the noise, is weak enough.
-    fn needed_by_either(
-        &mut self,
-        [denoised, noise]: [&DenoisedError; 2],
-        limit: f64,
-        spp: u64,
-    ) -> Option<u64> {
-        let needs =
-            [self.needed(denoised, limit, (spp, DENOISED_DECAY)), self.needed(noise, limit, (spp, DECAY))];
-        needs.into_iter().flatten().min()
-    }
 }
 
 fn judge_tile(
     view: &View<'_>,
     (part, error): &PartError,
-    tile: Tile,
+    (tile, lost): (Tile, f64),
     [limit, at_known_exposure]: [f64; 2],
     eyes: &mut Eyes<'_>,
 ) -> Verdict {
     let (film, spp) = (view.film, view.film.spp(tile.index));
     let evidence = film.unsampled_pixels(tile.index) <= tile.pixels() / NO_EVIDENCE;
     let place = within(tile, *part);
-    let (here, lost) = judged_by(error, place, limit, eyes);
     if lost <= limit {
         return Verdict::new(evidence).expecting(Some(spp)).with_loss(lost, false);
     }
@@ -384,7 +409,9 @@ fn judge_tile(
     let enough = evidence && lost.min(of_noise) <= at_known_exposure;
     let why = if enough { OpenFor::Exposure } else { OpenFor::Noise };
     let verdict = Verdict::new(false).kept_open_by(why);
-    let verdict = verdict.expecting(eyes.needed_by_either([&here, &noise], limit, spp));
+    let denoised = needed_denoised(lost, limit, spp);
+    let verdict = verdict
+        .expecting(Some(eyes.needed(&noise, limit, (spp, DECAY)).map_or(denoised, |n| n.min(denoised))));
     verdict.with_brightness(brightness_differs).with_loss(lost, false)
 }
 
@@ -402,17 +429,17 @@ fn darkness(
     (eyes.lost(&light, 1.0) > limit).then(|| eyes.needed(&light, limit, (film.spp(tile.index), UNMET_DECAY)))
 }
 
-/// The part of the error that a tile is judged by, its own or the square around it, and what that has lost.
-fn judged_by(error: &DenoisedError, tile: Tile, limit: f64, eyes: &mut Eyes<'_>) -> (DenoisedError, f64) {
-    let own = error.part(tile);
-    let lost = eyes.lost(&own, 1.0);
-    let square = square_around(tile, error.size());
-    if lost <= limit || square.pixels() == tile.pixels() {
-        return (own, lost);
-    }
-    let around = error.part(square);
-    let lost_around = eyes.lost(&around, 1.0);
-    if lost_around < lost { (around, lost_around) } else { (own, lost) }
+/// The samples per pixel at which no more than `limit` is lost of a denoised picture that has lost more after `spp` samples.
+fn needed_denoised(lost: f64, limit: f64, spp: u64) -> u64 {
+    (spp as f64 * (lost / limit).powf(1.0 / DENOISED_DECAY)).clamp(1.0, 1e15).ceil() as u64
+}
+
+/// The part of the error that a tile is judged by, its own or the square around it, whichever has lost less, and what that is.
+fn judged_by(error: &DenoisedError, tile: Tile, eyes: &mut Eyes<'_>) -> (DenoisedError, f64) {
+    let places = [tile, square_around(tile, error.size())];
+    let [own, around] = places.map(|place| error.part(place)).map(|part| (eyes.lost(&part, 1.0), part));
+    let (lost, part) = if around.0 < own.0 { around } else { own };
+    (part, lost)
 }
 
 /// The tile, grown to [`SQUARE`] pixels where a side is shorter, within the picture.
@@ -474,10 +501,13 @@ pub fn spp_with_denoising(
     let needs = tiles.par_iter().map_init(VisionWorkspace::default, |room, &tile| {
         let mut eyes = Eyes { model: &model, room };
         let limit = limit / stops_err_by(tiles.len());
-        let (here, _) = judged_by(&error, tile, limit, &mut eyes);
+        let (here, _) = judged_by(&error, tile, &mut eyes);
         let part = error.part(tile);
         let noise = noise_of(film, display, tile, Some(part.shown_in_channels().collect()));
-        Some(eyes.needed_by_either([&here, &noise], limit, film.spp(tile.index))? as f64)
+        let spp = film.spp(tile.index);
+        let needs = [(&here, DENOISED_DECAY), (&noise, DECAY)];
+        let needs = needs.map(|(error, decay)| eyes.needed(error, limit, (spp, decay)));
+        Some(needs.into_iter().flatten().min()? as f64)
     });
     let needs: Option<Vec<f64>> = needs.collect();
     let sum = |needs: Vec<f64>| -> f64 {
@@ -506,6 +536,22 @@ fn noise_of(film: &Film, display: &Display, tile: Tile, shown: Option<Vec<&[f32]
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of five that need 100, 10, 1, 100 and 1,000, the hardest draws as 800 would; those above draw nobody down.
+    #[test]
+    fn counts_are_drawn_together_within_bounds() {
+        // 100^0.85 · 800^0.15, 10^0.85 · 800^0.15, 800^0.15
+        let right = [
+            136.604_025_675_439_54,
+            19.295_831_501_316_908,
+            2.725_608_645_032_458,
+            136.604_025_675_439_54,
+            1000.0,
+        ];
+        let found = drawn_together(&[100.0, 10.0, 1.0, 100.0, 1000.0]);
+        assert!(found.iter().zip(right).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{found:?}");
+        assert!(drawn_together(&[]).is_empty());
+    }
 
     #[test]
     fn a_small_tile_is_in_the_middle_of_its_square_and_at_an_edge_as_near_as_can_be() {

@@ -14,7 +14,7 @@ use std::io::{self, Read, Write};
 use thiserror::Error;
 
 const FORMAT: Format = Format { magic: *b"NFCHECK\0", version: VERSION };
-const VERSION: u32 = 16;
+const VERSION: u32 = 17;
 
 /// A snapshot of a session, for resuming it: samples, verdicts, the display, and what was noticed of the
 /// samples. Made by [`Session::checkpoint`](crate::Session::checkpoint), resumed by

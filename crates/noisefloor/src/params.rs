@@ -28,8 +28,8 @@ pub enum Schedule {
     },
     /// Growing intervals, in multiples of `step`, for criteria whose verdicts take long however few tiles they judge, such as those
     /// that denoise. The first verdict comes after `step` samples per pixel, each later one where the criterion expects to be
-    /// satisfied, but after at least half as many samples again, and at most twice as many in all. If few tiles are open, each
-    /// gets more between two verdicts, within these limits: in all, as many as `step` samples for each pixel of the picture.
+    /// satisfied, but after at least half as many samples again, and at most four times as many in all. If few tiles are open, each
+    /// gets more between two verdicts, up to twice as many in all: together, `step` samples for each pixel of the picture.
     Growing {
         /// The finest spacing, in samples per pixel, at least 2.
         step: u64,
@@ -94,7 +94,8 @@ impl Schedule {
                 let whole = (step as f64 / open.max(f64::MIN_POSITIVE)) as u64;
                 let missing =
                     expected.map_or(0, |e| e.div_ceil(step).saturating_mul(step).saturating_sub(samples));
-                on_grid(samples + whole.max(missing).clamp(samples / 2, samples))
+                let most = samples.saturating_mul(3);
+                on_grid(samples + whole.min(samples).max(missing).clamp(samples / 2, most))
             }
         }
     }
@@ -335,8 +336,8 @@ mod tests {
         let schedule = Schedule::Growing { step: 16 };
         let next = |n: u64, open: f64| schedule.next(n, None, open);
         assert_eq!([0, 16, 32, 48, 64, 96].map(|n| next(n, 1.0)), [16, 32, 48, 64, 96, 144]);
-        // To the expected need, and at most twice what the tile has
-        assert_eq!([50, 96, 110, 500].map(|e| schedule.next(64, Some(e), 1.0)), [96, 96, 112, 128]);
+        // To the expected need, and at most four times what the tile has
+        assert_eq!([50, 96, 110, 500].map(|e| schedule.next(64, Some(e), 1.0)), [96, 96, 112, 256]);
         assert_eq!(next(17, 1.0), 32);
         // With a quarter of the tiles open 64 more, but no more than the tile has
         assert_eq!([0, 16, 48, 64, 96, 128, 160].map(|n| next(n, 0.25)), [16, 32, 96, 128, 160, 192, 240]);

@@ -128,6 +128,11 @@ impl RendererArgs {
         matches!(self.source, SourceKind::Ptwne(_))
     }
 
+    /// Whether our own path tracer renders a picture that was asked for in so small a size.
+    pub fn has_fewer_pixels(&self, pixels: u64) -> bool {
+        self.is_built_in() && self.size.is_some_and(|(width, height)| ((width * height) as u64) < pixels)
+    }
+
     /// With independent samples in the built-in renderer, unless others were asked for.
     #[must_use]
     pub fn independent_by_default(mut self) -> Self {

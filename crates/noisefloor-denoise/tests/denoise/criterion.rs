@@ -356,23 +356,23 @@ fn few_open_tiles_are_judged_by_what_is_near() {
         }
     }
     let view = View::new(&film, &Display::SRGB);
-    let judged = |tiles: &[Tile]| {
-        let asked: Arc<Mutex<Vec<Vec<Tile>>>> = Arc::default();
-        let mut criterion = DenoisedQuality::new(Parted(Simple::Bilateral(0.1), Arc::clone(&asked)), 0.1);
+    let asked: Arc<Mutex<Vec<Vec<Tile>>>> = Arc::default();
+    // Nothing is good enough, so that all tiles stay open
+    let mut criterion = DenoisedQuality::new(Parted(Simple::Bilateral(0.1), Arc::clone(&asked)), 1e-3);
+    let mut judged = |tiles: &[Tile]| {
         let verdicts = criterion.judge(&view, tiles).unwrap();
         let map = criterion.map_of_jods_lost().unwrap().to_vec();
-        let pixels = |parts: &Vec<Tile>| parts.iter().map(|part| part.pixels()).sum();
-        let asked: Vec<usize> = asked.lock().unwrap().iter().map(pixels).collect();
-        (asked, map, verdicts)
+        let parts = std::mem::take(&mut *asked.lock().unwrap());
+        let pixels = parts.iter().flatten().map(|part| part.pixels()).sum::<usize>();
+        (pixels, map, verdicts)
     };
-    let all = SIZE.0 * SIZE.1;
     let (asked, whole, verdicts) = judged(&tiles);
-    assert_eq!(asked, [all]);
+    assert_eq!(asked, SIZE.0 * SIZE.1);
     // In the corner, in the middle, and two that are far apart
     for (open, pixels) in [(vec![0], 96 * 96), (vec![79], 160 * 160), (vec![0, 139], 2 * 96 * 96)] {
         let open: Vec<Tile> = open.into_iter().map(|index| tiles[index]).collect();
         let (asked, map, of_open) = judged(&open);
-        assert_eq!(asked, [pixels]);
+        assert_eq!(asked, pixels);
         for (tile, verdict) in open.iter().zip(of_open) {
             let ratio = verdict.lost.unwrap() / verdicts[tile.index].lost.unwrap();
             assert!((ratio - 1.0).abs() < 0.05, "tile {}: x{ratio}", tile.index);
@@ -380,8 +380,6 @@ fn few_open_tiles_are_judged_by_what_is_near() {
             let ratio = sum(&map) / sum(&whole);
             assert!((ratio - 1.0).abs() < 0.05, "map of tile {}: x{ratio}", tile.index);
         }
-        let known = map.iter().filter(|lost| !lost.is_nan()).count();
-        assert_eq!(known, open.iter().map(|tile| tile.pixels()).sum::<usize>());
     }
 }
 
@@ -584,16 +582,23 @@ fn what_is_found_late_opens_denoised_tiles_that_had_stopped_and_does_after_a_res
     assert!(verdict.lost.is_some(), "{verdict:?}");
 }
 
-/// A tile that is satisfied goes on beside the others: to the 0.72th power of its need times the 0.28th of the greatest,
-/// or as near as a step of 1.2 is, and is judged there. So it is after a resume.
+/// A tile that is satisfied goes on beside the others: to the 0.85th power of its need times the 0.15th of the greatest, which counts
+/// as eight times the median's at most, or as near as a step of 1.2 is. It is not looked at again. So it is after a resume.
 #[test]
 fn counts_are_drawn_together() {
     let nothing = Find { tile: 0, pixel: 0, sample: u64::MAX, light: 0.0 };
-    let mut session = knows_the_wall();
-    let (mut first, mut resumed) = ([None; 6], false);
+    let asked: Arc<Mutex<Vec<Vec<Tile>>>> = Arc::default();
+    let begin = || session(Parted(Simple::Flat(0.3), Arc::clone(&asked)));
+    let mut session = begin();
+    let (mut first, mut resumed) = ([None::<u64>; 6], false);
     let mut rounds = 0;
     while !session.is_done() && rounds < 1_000 {
+        let known = [1, 2, 4, 5].iter().all(|&tile: &usize| first[tile].is_some());
+        asked.lock().unwrap().clear();
         round_with(&mut session, nothing);
+        // What lies around tiles 0 and 3, of 64 pixels each
+        let parts = asked.lock().unwrap().concat();
+        assert!(!known || parts.iter().all(|part| part.x + part.width <= 128), "{parts:?}");
         for (tile, first) in first.iter_mut().enumerate() {
             let converged = session.verdict(tile).is_some_and(|verdict| verdict.converged);
             *first = first.or(converged.then(|| session.film().spp(tile)));
@@ -601,7 +606,7 @@ fn counts_are_drawn_together() {
         if session.open_tiles() < 4 && !resumed {
             let mut bytes = Vec::new();
             session.checkpoint("together").unwrap().write(&mut bytes).unwrap();
-            session = knows_the_wall().resume("together", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+            session = begin().resume("together", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
             resumed = true;
         }
         rounds += 1;
@@ -610,8 +615,11 @@ fn counts_are_drawn_together() {
     let most = needs.into_iter().fold(0.0, f64::max);
     println!("{needs:?} {:?}", (0..6).map(|tile| session.film().spp(tile)).collect::<Vec<_>>());
     assert!(resumed && most > 8.0 * needs[4], "{needs:?}");
+    let mut sorted = needs;
+    sorted.sort_by(f64::total_cmp);
+    let bound = most.min(8.0 * sorted[3]);
     for (tile, need) in needs.into_iter().enumerate() {
-        let (spp, wanted) = (session.film().spp(tile) as f64, need.powf(0.72) * most.powf(0.28));
+        let (spp, wanted) = (session.film().spp(tile) as f64, need.powf(0.85) * bound.powf(0.15));
         // No verdict was against a plain tile: this denoiser knows them
         let least = if [0, 3].contains(&tile) { need } else { wanted / 1.2 };
         assert!(spp >= least && spp <= most, "{tile}: {spp} of {wanted}");

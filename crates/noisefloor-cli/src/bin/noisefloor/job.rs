@@ -15,9 +15,10 @@ use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
 use std::time::Duration;
 
-/// The first verdict on denoised halves of the built-in renderer, in samples per pixel: what two denoisings cost is worth
-/// more of its samples than of slower renderers'.
+/// The first verdict on denoised halves of the built-in renderer, in samples per pixel, where the first step has fewer samples of the
+/// picture than the second number: hardly a tile is let go then, since nothing may have met its light.
 pub const FIRST_DENOISED: u64 = 32;
+pub const FIRST_DENOISED_SAMPLES: u64 = 1 << 21;
 
 /// What is rendered, who stops it, and until when: all that picture and stops depend on. Values are
 /// checked; what it names is read when it is set up.

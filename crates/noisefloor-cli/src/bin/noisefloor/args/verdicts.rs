@@ -1,6 +1,6 @@
 //! `noisefloor render`: what stops a tile, and when it is judged.
 
-use crate::job::{FIRST_DENOISED, Limits};
+use crate::job::{FIRST_DENOISED, FIRST_DENOISED_SAMPLES, Limits};
 use clap::{Args, ValueEnum, ValueHint};
 use noisefloor::{Audience, Params, Schedule};
 use noisefloor_cli::options::{renderer::RendererArgs, values};
@@ -21,7 +21,7 @@ pub struct VerdictArgs {
     )]
     pub criterion: CriterionChoice,
     /// With --denoise: just-objectionable differences (JOD) that a tile may have lost when it stops; 19 of
-    /// 20 have lost less, so it stops at an estimate of 1/1.1 of that, or of two thirds in pictures of fewer
+    /// 20 have lost less, so it stops at an estimate of 1/1.2 of that, or of two thirds in pictures of fewer
     /// than 16 tiles. At 1, three of four people prefer the converged picture; the default is what zones had
     /// lost, on average, where people stopped seeing noise in them.
     #[arg(
@@ -33,16 +33,16 @@ pub struct VerdictArgs {
     )]
     pub lost: f64,
     /// With --denoise: the picture that is written is the mean of what the denoiser makes of it and of its mirror
-    /// images, 4 or 8 in all; or, with 1, what it makes of the picture alone. The mean has less of what denoisers get
-    /// wrong by chance; verdicts take that into account.
-    #[arg(long, value_name = "1|4|8", requires = "denoise", default_value = "4", value_parser = passes)]
-    pub denoise_passes: DenoisePasses,
+    /// images, 4 in all; or, with 1, what it makes of the picture alone [default: 4, or 1 with the built-in renderer,
+    /// which is fast]. The mean has less of what denoisers get wrong by chance; verdicts take that into account.
+    #[arg(long, value_name = "1|4", requires = "denoise", value_parser = passes)]
+    pub denoise_passes: Option<DenoisePasses>,
     /// For whom: `observers` (those of the training data), `art-students` (1.8 times the samples), a
     /// factor on samples, or a,b for T' = a T + b [default: see --eyes].
     #[arg(long, value_name = "WHO", value_parser = values::audience)]
     pub audience: Option<Audience>,
     /// No tile stops before this many samples per pixel [default: 16, or one batch with --batch; with
-    /// --denoise 32 of the built-in renderer]. Below 100, only tiles stop whose noise is spread over many pixels, in
+    /// --denoise 32 of the built-in renderer, in pictures of fewer than 131,072 pixels]. Below 100, only tiles stop whose noise is spread over many pixels, in
     /// pictures of two million samples. More find more of the light that is seldom found.
     #[arg(long, value_name = "SPP")]
     pub min_spp: Option<u64>,
@@ -103,7 +103,7 @@ pub enum CriterionChoice {
 }
 
 fn passes(text: &str) -> Result<DenoisePasses, String> {
-    text.parse().ok().and_then(DenoisePasses::new).ok_or_else(|| "expected 1, 4 or 8".into())
+    text.parse().ok().and_then(DenoisePasses::new).ok_or_else(|| "expected 1 or 4".into())
 }
 
 fn criterion(text: &str) -> Result<CriterionChoice, String> {
@@ -142,7 +142,7 @@ impl VerdictArgs {
         let draft = preset == Some(Preset::Draft);
         // With steps that were asked for, or that a denoiser has, the first one is a verdict
         let first = match self.batch {
-            None if denoise && renderer.is_built_in() => FIRST_DENOISED,
+            None if denoise && renderer.has_fewer_pixels(FIRST_DENOISED_SAMPLES / step(16)) => FIRST_DENOISED,
             _ if denoise => 0,
             Some(_) => 0,
             None => Params::default().min_spp,
