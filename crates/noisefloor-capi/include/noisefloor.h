@@ -380,8 +380,8 @@ NfStatus nf_session_new(size_t width,
 // verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 // NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 // NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
-// independent of each other; nf_first_hits_are_clean knows whether denoise may take them at their word. passes is 1, or 4 or
-// 8 if the finished picture is made by nf_mirror_mean.
+// independent of each other; nf_first_hits_are_clean knows whether denoise may take them at their word. passes is 1, or 4
+// if the finished picture is made by nf_mirror_mean.
 NfStatus nf_session_new_denoised(size_t width,
                                  size_t height,
                                  NfDenoise denoise,
@@ -462,7 +462,7 @@ NfStatus nf_first_hits_are_clean(size_t width,
 
 // Writes into denoised the mean of what denoise makes of a picture and of its mirror images: it has less of what denoisers get
 // wrong by chance. albedo and normal are NULL, or mirrored with it. All pictures have floats floats, 3 * width * height.
-// passes is 1, 4, or 8, with rows for columns: width and height that denoise is told are then exchanged.
+// passes is 1 or 4.
 NfStatus nf_mirror_mean(size_t width,
                         size_t height,
                         NfDenoise denoise,

@@ -91,7 +91,7 @@ impl Denoiser for DenoisedBy {
 }
 
 pub(crate) fn passes_of(count: u32) -> Result<DenoisePasses, Failure> {
-    let why = || Failure::new(NfStatus::Argument, format!("passes must be 1, 4 or 8, not {count}"));
+    let why = || Failure::new(NfStatus::Argument, format!("passes must be 1 or 4, not {count}"));
     DenoisePasses::new(count as usize).ok_or_else(why)
 }
 
@@ -153,7 +153,7 @@ pub unsafe extern "C" fn nf_first_hits_are_clean(
 
 /// Writes into denoised the mean of what denoise makes of a picture and of its mirror images: it has less of what denoisers get
 /// wrong by chance. albedo and normal are NULL, or mirrored with it. All pictures have floats floats, 3 * width * height.
-/// passes is 1, 4, or 8, with rows for columns: width and height that denoise is told are then exchanged.
+/// passes is 1 or 4.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_mirror_mean(
     width: usize,

@@ -191,8 +191,8 @@ pub unsafe extern "C" fn nf_session_new(
 /// verdict takes two calls, on whichever thread calls nf_session_judge: params is NULL for the defaults with the schedule
 /// NF_SCHEDULE_GROWING, and step and min_spp of 48. denoise and user must last as long as the session. first_hits is
 /// NULL, or four pictures of floats floats each, which are copied: albedo and normal for one half, then for the other,
-/// independent of each other; nf_first_hits_are_clean knows whether denoise may take them at their word. passes is 1, or 4 or
-/// 8 if the finished picture is made by nf_mirror_mean.
+/// independent of each other; nf_first_hits_are_clean knows whether denoise may take them at their word. passes is 1, or 4
+/// if the finished picture is made by nf_mirror_mean.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_session_new_denoised(
     width: usize,

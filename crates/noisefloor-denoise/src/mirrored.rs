@@ -22,8 +22,6 @@ pub enum DenoisePasses {
     One,
     /// And mirrored left to right, top to bottom, and both.
     Four,
-    /// And all of these with rows for columns.
-    Eight,
 }
 
 impl DenoisePasses {
@@ -32,7 +30,6 @@ impl DenoisePasses {
         match self {
             Self::One => 1,
             Self::Four => 4,
-            Self::Eight => 8,
         }
     }
 
@@ -40,13 +37,13 @@ impl DenoisePasses {
     pub(crate) fn gain(self) -> f32 {
         match self {
             Self::One => 1.0,
-            Self::Four | Self::Eight => GAIN,
+            Self::Four => GAIN,
         }
     }
 
-    /// One, four or eight; `None` of anything else.
+    /// One or four; `None` of anything else.
     pub fn new(count: usize) -> Option<Self> {
-        [Self::One, Self::Four, Self::Eight].into_iter().find(|passes| passes.count() == count)
+        [Self::One, Self::Four].into_iter().find(|passes| passes.count() == count)
     }
 }
 
@@ -91,7 +88,7 @@ impl<D: Denoiser> Denoiser for MirrorMean<D> {
             let made = self.denoiser.denoise_both(turned.each_ref().map(Turned::picture).each_ref())?;
             for (image, made) in images.into_iter().zip(made) {
                 if made.len() != sums.len() {
-                    return Err(DenoiseError::Pixels { size: image.size(), got: made.len() });
+                    return Err(DenoiseError::Pixels { size: picture.size, got: made.len() });
                 }
                 for (place, made) in image.places().zip(made) {
                     sums[place].iter_mut().zip(made).for_each(|(sum, value)| *sum += f64::from(value));
@@ -107,7 +104,7 @@ impl<D: Denoiser> Denoiser for MirrorMean<D> {
     }
 }
 
-/// One of the eight ways to lay a rectangle on itself, or on itself with rows for columns.
+/// One of the four ways to lay a rectangle on itself.
 #[derive(Clone, Copy)]
 struct Image {
     /// Of the picture.
@@ -115,28 +112,20 @@ struct Image {
     height: usize,
     across: bool,
     down: bool,
-    transposed: bool,
 }
 
 impl Image {
     fn new(number: usize, (width, height): (usize, usize)) -> Self {
         let is = |bit: usize| number & bit != 0;
-        Self { width, height, across: is(1), down: is(2), transposed: is(4) }
-    }
-
-    /// Width and height.
-    fn size(self) -> (usize, usize) {
-        if self.transposed { (self.height, self.width) } else { (self.width, self.height) }
+        Self { width, height, across: is(1), down: is(2) }
     }
 
     /// Where each of its pixels, row by row, lies in the picture.
     fn places(self) -> impl Iterator<Item = usize> {
-        let (width, height) = self.size();
-        (0..height).flat_map(move |i| (0..width).map(move |j| self.place(j, i)))
+        (0..self.height).flat_map(move |y| (0..self.width).map(move |x| self.place(x, y)))
     }
 
-    fn place(self, j: usize, i: usize) -> usize {
-        let (x, y) = if self.transposed { (i, j) } else { (j, i) };
+    fn place(self, x: usize, y: usize) -> usize {
         let x = if self.across { self.width - 1 - x } else { x };
         let y = if self.down { self.height - 1 - y } else { y };
         y * self.width + x
@@ -157,7 +146,7 @@ impl Turned {
     fn new(picture: &NoisyPicture<'_>, image: Image) -> Self {
         let turn = |plane: &[Rgb]| -> Vec<Rgb> { image.places().map(|place| plane[place]).collect() };
         Self {
-            size: image.size(),
+            size: picture.size,
             radiance: turn(picture.radiance),
             albedo: picture.albedo.map(turn),
             normal: picture.normal.map(turn),

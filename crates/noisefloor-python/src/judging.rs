@@ -128,7 +128,7 @@ pub(crate) fn first_hits_are_clean(first_hits: Hits<'_>) -> PyResult<bool> {
 /// chance. Albedo and normals are mirrored with it.
 ///
 /// denoiser: as of a Session. radiance, albedo, normal: arrays of shape (height, width, 3), the last two both or
-///     neither. passes: 1, 4 or 8, with rows for columns.
+///     neither. passes: 1 or 4.
 ///
 /// A Session whose finished picture is such a mean is told so by its `passes`.
 #[pyfunction]
@@ -179,7 +179,7 @@ fn must_be_callable(denoiser: &Bound<'_, PyAny>) -> PyResult<()> {
 
 fn passes_of(count: usize) -> PyResult<DenoisePasses> {
     DenoisePasses::new(count)
-        .ok_or_else(|| ParameterError::new_err(format!("passes must be 1, 4 or 8, not {count}")))
+        .ok_or_else(|| ParameterError::new_err(format!("passes must be 1 or 4, not {count}")))
 }
 
 fn guides([a, b]: Hits<'_>, size: (usize, usize)) -> PyResult<Guides> {

@@ -42,7 +42,7 @@ use std::sync::{Mutex, MutexGuard};
 /// first_hits: ((albedo, normal), (albedo, normal)), a pair for each half, independent of each other: arrays of shape
 ///     (height, width, 3). The denoiser is then called with (radiance, albedo, normal); first_hits_are_clean knows whether it may take
 ///     them at their word.
-/// passes: 4 or 8 if the finished picture is the mean of so many mirror images (mirror_mean). Verdicts take one.
+/// passes: 4 if the finished picture is the mean of so many mirror images (mirror_mean). Verdicts take one.
 /// linear: says that what is pushed is linear radiance, so that no warning asks: where all batches
 ///     have one size, nothing tells that from values that were encoded for a screen.
 ///

@@ -703,8 +703,6 @@ class Denoised(unittest.TestCase):
         np.testing.assert_allclose(nf.mirror_mean(smear, picture[:, ::-1]), made[:, ::-1], atol=1e-6)
         self.assertGreater(abs(smear(picture[:, ::-1]) - smear(picture)[:, ::-1]).max(), 0.1)
         np.testing.assert_array_equal(nf.mirror_mean(smear, picture, passes=1), smear(picture))
-        turned = nf.mirror_mean(smear, picture.transpose(1, 0, 2), passes=8)
-        np.testing.assert_allclose(turned.transpose(1, 0, 2), nf.mirror_mean(smear, picture, passes=8), atol=1e-6)
         # Albedo and normals are mirrored with the picture
         guided = nf.mirror_mean(smear, picture, picture, np.zeros_like(picture))
         np.testing.assert_allclose(guided, made + picture, atol=1e-6)
@@ -725,7 +723,7 @@ class Denoised(unittest.TestCase):
         # A session is told, and remembers where it goes
         session = self.session(smooth, passes=4)
         pickle.loads(pickle.dumps(session))
-        with self.assertRaisesRegex(nf.ParameterError, "1, 4 or 8"):
+        with self.assertRaisesRegex(nf.ParameterError, "1 or 4"):
             self.session(smooth, passes=2)
 
     def test_first_hits_are_clean_where_halves_agree(self):

@@ -119,8 +119,6 @@ fn the_mean_of_its_mirror_images_is_symmetric() {
         let pixels = rows.flat_map(|(row, other)| row.iter().zip(other.iter().rev()));
         pixels.map(|(a, b)| (a[1] - b[1]).abs()).fold(0.0, f32::max)
     };
-    let [alone, four, eight] =
-        [DenoisePasses::One, DenoisePasses::Four, DenoisePasses::Eight].map(&mut apart);
-    assert!(alone > 1e-4, "{alone}");
-    assert!(four < 1e-6 && eight < 1e-6, "{four} and {eight}");
+    let [alone, four] = [DenoisePasses::One, DenoisePasses::Four].map(&mut apart);
+    assert!(alone > 1e-4 && four < 1e-6, "{alone} and {four}");
 }

@@ -217,7 +217,7 @@ class Session:
         denoiser: Callable[..., ArrayLike] | None = None,
         lost: float = 0.3,
         first_hits: Sequence[Sequence[ArrayLike]] | None = None,
-        passes: Literal[1, 4, 8] = 1,
+        passes: Literal[1, 4] = 1,
         linear: bool = False,
     ) -> Session: ...
     @property
@@ -263,7 +263,7 @@ def mirror_mean(
     albedo: ArrayLike | None = None,
     normal: ArrayLike | None = None,
     *,
-    passes: Literal[1, 4, 8] = 4,
+    passes: Literal[1, 4] = 4,
 ) -> NDArray[np.float32]: ...
 @final
 class Background:
