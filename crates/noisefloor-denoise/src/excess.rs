@@ -47,7 +47,7 @@ impl DenoisedError {
         let unmet = jods_lost_unmet(film, self.display(), viewing);
         let ratio = |room: &mut VisionWorkspace, square: Tile| {
             let estimated = self.jods_lost(Tile { index: 0, ..square }, &eyes, room)?;
-            let unmet = unmet.iter().filter(|(tile, _)| overlap(tile, &square)).map(|(_, lost)| *lost);
+            let unmet = unmet.iter().filter(|(tile, ..)| overlap(tile, &square)).map(|(_, lost, _)| *lost);
             Ok((square, unmet.fold(estimated * ESTIMATE_ERRS_BY, f64::max) / lost))
         };
         squares.into_par_iter().map_init(VisionWorkspace::default, ratio).collect()

@@ -2,7 +2,7 @@
 //! noise, and remove them.
 
 use crate::estimate::DenoisedError;
-use noisefloor::{Film, Tile, Viewing, display::Display, unmet::Unmet};
+use noisefloor::{Film, Tile, Viewing, criterion::OpenFor, display::Display, unmet::Unmet};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use rayon::prelude::*;
 
@@ -25,13 +25,14 @@ pub(crate) fn unmet_error(
 }
 
 /// Just-objectionable differences (JOD) that each tile of a film would lose by the light that it is likely to lack, in their
-/// order, with the tiles. The film keeps two halves; the formula is [`Unmet`]'s.
-pub fn jods_lost_unmet(film: &Film, display: &Display, viewing: &Viewing) -> Vec<(Tile, f64)> {
+/// order, with the tiles and what tells of it. The film keeps two halves; the formula is [`Unmet`]'s.
+pub fn jods_lost_unmet(film: &Film, display: &Display, viewing: &Viewing) -> Vec<(Tile, f64, OpenFor)> {
     let (eyes, unmet) = (VisionModel::new(viewing), Unmet::of(film, display, *viewing));
     let tiles: Vec<Tile> = film.grid().tiles().collect();
     let lost = |room: &mut VisionWorkspace, &tile: &Tile| {
         let error = unmet_error(film, display, &unmet, tile);
-        (tile, error.map_or(0.0, |error| error.jods_lost_at(1.0, &eyes, room).unwrap_or(10.0)))
+        let lost = error.map_or(0.0, |error| error.jods_lost_at(1.0, &eyes, room).unwrap_or(10.0));
+        (tile, lost, unmet.kind(film, tile))
     };
     tiles.par_iter().map_init(VisionWorkspace::default, lost).collect()
 }

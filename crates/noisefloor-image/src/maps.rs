@@ -10,6 +10,7 @@ use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 use noisefloor::{Rgb, Tile};
+use std::collections::BTreeSet;
 use std::convert::Infallible;
 use std::path::Path;
 
@@ -24,6 +25,8 @@ pub struct TileMark {
     pub label: String,
     /// Whether the tile is unfamiliar to the model: marked in its corner.
     pub unfamiliar: bool,
+    /// Colour of a frame within the tile, and what it says in the legend, in eleven letters.
+    pub frame: Option<([u8; 3], &'static str)>,
 }
 
 /// How values become colours.
@@ -191,6 +194,16 @@ impl Canvas {
         }
     }
 
+    /// A frame two pixels wide, with ink inside, that begins at (x, y).
+    fn frame(&mut self, (x, y): (usize, usize), (width, height): (usize, usize), colour: [u8; 3]) {
+        for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
+            let inset = row.min(column).min(height - 1 - row).min(width - 1 - column);
+            if inset < 3 {
+                self.set(x + column, y + row, if inset == 2 { INK } else { colour });
+            }
+        }
+    }
+
     /// White letters around a centre, with dark outlines that keep them readable on any picture.
     pub fn label(&mut self, text: &str, (x, y): (usize, usize), font: &MonoFont<'_>) {
         for (dx, dy) in [(0, 1), (2, 1), (1, 0), (1, 2)] {
@@ -226,13 +239,17 @@ const LEGEND: usize = 104;
 const LEAST_HEIGHT: usize = 140;
 /// Edge of the mark on unfamiliar tiles; fits into the smallest tile.
 const CORNER: usize = 11;
+/// Between lines of the legend.
+const LINE: usize = 20;
 const PAPER: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [20, 20, 20];
 
 /// Draws `marks` over a picture, legend at the right.
 pub fn draw_tiles(picture: &Canvas, marks: &[TileMark], scale: &ColourScale) -> Canvas {
     let (width, height) = (picture.width(), picture.height());
-    let mut canvas = Canvas::new(width + LEGEND, height.max(LEAST_HEIGHT), PAPER);
+    let frames: BTreeSet<([u8; 3], &str)> = marks.iter().filter_map(|mark| mark.frame).collect();
+    let height = height.max(LEAST_HEIGHT + LINE * frames.len());
+    let mut canvas = Canvas::new(width + LEGEND, height, PAPER);
 
     for mark in marks {
         tint(&mut canvas, picture, mark.tile, scale.colour(mark.value));
@@ -241,14 +258,18 @@ pub fn draw_tiles(picture: &Canvas, marks: &[TileMark], scale: &ColourScale) -> 
         frame(&mut canvas, mark);
     }
 
-    let lowest = height.max(LEAST_HEIGHT) - 16;
+    let mut lowest = height - 16;
     if marks.iter().any(|m| m.unfamiliar) {
         canvas.corner(width + 12, lowest - 1);
         canvas.text("unfamiliar", (width + 27, lowest + 4), &FONT_7X13, INK, Alignment::Left);
-        draw_legend(&mut canvas, width, lowest - 20, scale);
-    } else {
-        draw_legend(&mut canvas, width, lowest, scale);
+        lowest -= LINE;
     }
+    for (colour, name) in frames {
+        canvas.frame((width + 12, lowest - 1), (CORNER, CORNER), colour);
+        canvas.text(name, (width + 27, lowest + 4), &FONT_7X13, INK, Alignment::Left);
+        lowest -= LINE;
+    }
+    draw_legend(&mut canvas, width, lowest, scale);
     canvas
 }
 
@@ -261,13 +282,16 @@ fn tint(canvas: &mut Canvas, picture: &Canvas, tile: Tile, colour: [u8; 3]) {
     }
 }
 
-/// Borders at the left and the top, the label, and the corner of an unfamiliar tile.
-fn frame(canvas: &mut Canvas, TileMark { tile, label, unfamiliar, .. }: &TileMark) {
+/// Borders at the left and the top, the frame, the label, and the corner of an unfamiliar tile.
+fn frame(canvas: &mut Canvas, TileMark { tile, label, unfamiliar, frame, .. }: &TileMark) {
     for x in tile.x..tile.x + tile.width {
         canvas.set(x, tile.y, INK);
     }
     for y in tile.y..tile.y + tile.height {
         canvas.set(tile.x, y, INK);
+    }
+    if let Some((colour, _)) = frame.filter(|_| tile.width.min(tile.height) > CORNER) {
+        canvas.frame((tile.x + 1, tile.y + 1), (tile.width - 1, tile.height - 1), colour);
     }
     let (font, advance) = if tile.width >= 100 { (&FONT_7X13_BOLD, 7) } else { (&FONT_6X10, 6) };
     if label.len() * advance + 4 <= tile.width && tile.height >= 14 {

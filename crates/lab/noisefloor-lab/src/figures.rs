@@ -69,6 +69,7 @@ fn mark(zone: &Prediction, places: &Places) -> Option<TileMark> {
         value: zone.predicted_spp / zone.human_spp,
         label: format!("{:.0} | {:.0}", zone.human_spp, zone.predicted_spp),
         unfamiliar: zone.unfamiliar,
+        frame: None,
     })
 }
 

@@ -1,5 +1,5 @@
-use crate::kit::{column, command, fail, grey_exr, json, succeed, text};
-use noisefloor_image::read_exr;
+use crate::kit::{column, command, fail, grey_exr, json, random, succeed, text};
+use noisefloor_image::{Picture, RenderLayers, read_exr, read_picture, write_exr};
 use noisefloor_testkit::{Requirement, require, require_python};
 use std::path::Path;
 use tempfile::tempdir;
@@ -29,6 +29,39 @@ fn a_folder_of_pictures_is_played_back() {
     assert!(report["samples_dropped"].is_null(), "{report}");
     fail(&fixed("exr", text(&stack), &out, &["--size", "48x40"]), &["--size", "--source exr"]);
     fail(&["render", "--source", "exr"], &["needs a folder"]);
+}
+
+/// A dot in one of two batches is light that tiles apart from it may lack: table, report, summary and map say so.
+#[test]
+fn what_tiles_wait_for_is_said() {
+    let folder = tempdir().unwrap();
+    let (stack, out) = (folder.path().join("stack"), folder.path().join("out"));
+    std::fs::create_dir(&stack).unwrap();
+    for (seed, name) in ["batch_0_8.exr", "batch_8_16.exr"].iter().enumerate() {
+        let mut noise = random(seed as u64);
+        let mut pixels: Vec<[f32; 3]> = (0..256 * 256).map(|_| [0.4 + 0.001 * noise() as f32; 3]).collect();
+        pixels[70 * 256 + 80] = [[0.4; 3], [3e4; 3]][seed];
+        write_exr(stack.join(name), &RenderLayers::rgb(256, 256, &pixels)).unwrap();
+    }
+    let said = succeed(&["render", "--source", "exr", text(&stack), "--tile", "64", "--out", text(&out)]);
+
+    // Windows around pixels of twelve tiles are apart from it
+    let waits = column(&out.join("stops.csv"), "open_for");
+    let apart = [2, 3, 6, 7].into_iter().chain(8..16);
+    assert!(apart.into_iter().all(|tile| waits[tile] == "unmet-light"), "{waits:?}");
+    let count = |why: &str| waits.iter().filter(|waits| *waits == why).count();
+    let unmet = count("unmet-light");
+    let reported = &json(&out.join("report.json"))["open_for"];
+    assert_eq!(reported["unmet-light"].as_u64(), Some(unmet as u64), "{reported}");
+    let all: u64 = reported.as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
+    assert_eq!(all as usize, waits.len() - count(""), "{reported}");
+    assert!(said.contains(&format!("{unmet} of 16 tiles wait for light")), "{said}");
+    assert!(said.contains("one dot at (80, 70) holds 100 % of it"), "{said}");
+    let Picture::Display(map) = read_picture(out.join("stops.png")).unwrap() else { panic!("a PNG") };
+    let framed = [255.0, 210.0, 40.0].map(|byte: f32| byte / 255.0);
+    let is_framed = |x: usize, y: usize| map.pixels[y * map.width + x] == framed;
+    assert!(is_framed(193, 200) && !is_framed(200, 200), "the frame of the last tile");
+    assert!((256..map.width).any(|x| (0..map.height).any(|y| is_framed(x, y))), "the legend");
 }
 
 /// A program that writes PFM, here in Python, in whole images: until the oracle is satisfied or the samples

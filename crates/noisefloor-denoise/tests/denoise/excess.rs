@@ -28,7 +28,10 @@ fn pair_of(halves: &[Vec<Rgb>; 2]) -> PicturePair {
 
 /// Tiles that lose more than the limit by light that they are likely to lack.
 fn lacking(halves: &[Vec<Rgb>; 2]) -> Vec<usize> {
-    let by_light = |display: &Display, film: &Film| Ok(jods_lost_unmet(film, display, &Viewing::default()));
+    let by_light = |display: &Display, film: &Film| {
+        let lost = jods_lost_unmet(film, display, &Viewing::default());
+        Ok(lost.into_iter().map(|(tile, lost, _)| (tile, lost)).collect())
+    };
     let lost = pair_of(halves).look_by(&params(), None, by_light).unwrap().squares;
     lost.iter().filter(|(_, lost)| *lost > LIMIT).map(|(tile, _)| tile.index).collect()
 }

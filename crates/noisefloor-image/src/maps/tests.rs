@@ -19,8 +19,11 @@ fn values_map_to_the_ends_of_the_scale() {
 #[test]
 fn colours_lie_over_their_tiles() {
     let grid = noisefloor::TileGrid::new(64, 32, 32).unwrap();
-    let mark =
-        |i: usize| TileMark { tile: grid.tile(i), value: i as f64, label: String::new(), unfamiliar: i == 1 };
+    let frame = [None, Some(([255, 0, 0], "red"))];
+    let mark = |i: usize| {
+        let (tile, value, label) = (grid.tile(i), i as f64, String::new());
+        TileMark { tile, value, label, unfamiliar: i == 1, frame: frame[i] }
+    };
     let scale = ColourScale {
         title: "t",
         low: 0.0,
@@ -35,8 +38,14 @@ fn colours_lie_over_their_tiles() {
     assert_eq!(at(16, 16), [68.0, 1.0, 84.0].map(|c: f32| (0.55 * c).round() as u8));
     assert_eq!(at(48, 16), [253.0, 231.0, 37.0].map(|c: f32| (0.55 * c).round() as u8));
     // The mark of the second tile, and its like in the legend.
-    assert_eq!((at(34, 2), at(64 + 13, LEAST_HEIGHT - 16)), (&PAPER[..], &PAPER[..]));
+    assert_eq!((at(34, 2), at(64 + 13, canvas.height() - 16)), (&PAPER[..], &PAPER[..]));
     assert_ne!(at(2, 2), PAPER);
+    // Its frame, inside the borders and all around, and the line above in the legend
+    for (x, y) in [(50, 1), (50, 2), (50, 31), (62, 16), (63, 16), (63, 31), (64 + 13, canvas.height() - 36)]
+    {
+        assert_eq!(at(x, y), [255, 0, 0], "{x} {y}");
+    }
+    assert!([(40, 0), (40, 3), (61, 16), (8, 1)].iter().all(|&(x, y)| at(x, y) != [255, 0, 0]));
 }
 
 #[test]

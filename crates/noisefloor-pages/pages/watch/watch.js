@@ -38,6 +38,14 @@ function show(next) {
   byId("progress").textContent = words.join(" · ");
   byId("done").value = done / state.tiles.length;
   document.title = `${Math.round((100 * done) / state.tiles.length)} % ${state.scene}`;
+  const waiting = Object.entries(WAITS_FOR).map(([why, colour]) => {
+    const key = document.createElement("span");
+    key.style.borderBottom = `3px solid ${colour}`;
+    const count = state.tiles.filter((tile) => tile.open && tile.open_for === why).length;
+    key.textContent = count === 0 ? "" : `${count} open for ${why}`;
+    return key;
+  });
+  byId("waiting").replaceChildren(...waiting.filter((key) => key.textContent !== ""));
   if (state.picture !== shown) {
     shown = state.picture;
     byId("picture").src = `api/picture.png?${shown}`;

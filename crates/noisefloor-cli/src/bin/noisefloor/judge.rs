@@ -8,6 +8,7 @@ mod report;
 pub use denoised::DenoisedJob;
 pub use read::warn_unread;
 
+use crate::output::open_for_colour;
 use anyhow::Context;
 use frames::{Judged, Place};
 use noisefloor::{
@@ -185,6 +186,7 @@ fn draw(
             value: f64::from(row.probability),
             label: format!("{:.2}", row.probability),
             unfamiliar: row.unfamiliar,
+            frame: row.open_for.and_then(open_for_colour),
         };
         let marks: Vec<TileMark> = rows.iter().map(mark).collect();
         let (title, colours) = ("P(no noise\nis seen)", colorous::CIVIDIS);

@@ -8,6 +8,7 @@ mod tiles;
 
 pub use denoised::{Denoised, ERROR_SCALE};
 pub use summary::say_noise;
+pub use tiles::open_for_colour;
 
 use crate::job::{CriterionJob, RenderJob};
 use anyhow::{Context, bail};

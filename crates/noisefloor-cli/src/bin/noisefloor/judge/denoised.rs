@@ -5,6 +5,7 @@ use super::read::{read, warn_of};
 use anyhow::{Context, bail};
 use noisefloor::{
     Rgb, Tile, TileGrid, ToneMapping, Viewing,
+    criterion::OpenFor,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
 };
@@ -46,8 +47,7 @@ struct Row {
     height: usize,
     jods_lost: f64,
     converged: bool,
-    /// Whether it is open for light alone that hardly any sample has met.
-    unmet: bool,
+    open_for: Option<OpenFor>,
 }
 
 #[derive(Serialize)]
@@ -120,16 +120,20 @@ fn denoised(path: &Path, of: &Still, viewing: &Viewing) -> anyhow::Result<Vec<Rg
 }
 
 /// `unmet` has what each tile would lose by light that it is likely to lack, if the pictures tell.
-fn judge(job: &DenoisedJob, error: &DenoisedError, unmet: &[(Tile, f64)]) -> anyhow::Result<Vec<Row>> {
+fn judge(
+    job: &DenoisedJob,
+    error: &DenoisedError,
+    unmet: &[(Tile, f64, OpenFor)],
+) -> anyhow::Result<Vec<Row>> {
     let grid = TileGrid::new(error.size().0, error.size().1, job.tile)?;
     let (eyes, mut room) = (VisionModel::new(&job.viewing), VisionWorkspace::default());
     let mut row = |tile: Tile| {
         let jods_lost = error.jods_lost(tile, &eyes, &mut room)?;
         let Tile { index, x, y, width, height } = tile;
         let enough = jods_lost * ESTIMATE_ERRS_BY <= job.lost;
-        let lacking = unmet.get(index).is_some_and(|(_, lost)| *lost > job.lost);
-        let (converged, unmet) = (enough && !lacking, enough && lacking);
-        Ok(Row { tile: index, x, y, width, height, jods_lost, converged, unmet })
+        let lacking = unmet.get(index).filter(|(_, lost, _)| *lost > job.lost).map(|(.., kind)| *kind);
+        let open_for = if enough { lacking } else { Some(OpenFor::Noise) };
+        Ok(Row { tile: index, x, y, width, height, jods_lost, converged: open_for.is_none(), open_for })
     };
     grid.tiles().map(&mut row).collect()
 }
@@ -146,11 +150,11 @@ fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
         });
     }
     say!("tile     x     y   size  JOD lost  verdict")?;
-    for Row { tile, x, y, width, height, jods_lost, converged, unmet } in rows {
-        let verdict = match (converged, unmet) {
-            (true, _) => "converged",
-            (_, true) => "light?",
-            _ => "error seen",
+    for Row { tile, x, y, width, height, jods_lost, open_for, .. } in rows {
+        let verdict = match open_for {
+            None => "converged",
+            Some(OpenFor::Noise) => "error seen",
+            Some(_) => "light?",
         };
         say!("{tile:4} {x:5} {y:5} {:>8} {jods_lost:8.3}  {verdict}", format!("{width}×{height}"))?;
     }
@@ -160,7 +164,7 @@ fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
         job.lost,
         job.lost / ESTIMATE_ERRS_BY
     )?;
-    let missing = rows.iter().filter(|row| row.unmet).count();
+    let missing = rows.iter().filter(|row| !matches!(row.open_for, None | Some(OpenFor::Noise))).count();
     if missing > 0 {
         say!(
             "{missing} would pass, but are likely to lack light that only one of the pictures has met, or neither: render more"

@@ -106,23 +106,25 @@ impl Output {
         for (&why, count) in &counts {
             match why {
                 OpenFor::Exposure => say!(
-                    "{count} tiles wait for the exposure, which so few samples do not tell yet; --exposure sets one"
+                    "{count} of {tiles} tiles wait for the exposure, which so few samples do not tell yet; --exposure sets one"
                 )?,
                 OpenFor::UnmetLight => {
                     let dot = brightest_find(session).map(|(x, y, share)| {
-                        format!(": that at ({x}, {y}) is {:.0} % of all such light", 100.0 * share)
+                        format!("; one dot at ({x}, {y}) holds {:.0} % of it", 100.0 * share)
                     });
                     say!(
-                        "{count} tiles wait for light that they may not have met: few samples have met it elsewhere, \
-                         and as much would be seen in them{}",
+                        "{count} of {tiles} tiles wait for light that few samples have met elsewhere, \
+                         and that would be seen in them{}",
                         dot.unwrap_or_default()
                     )?;
                 }
                 OpenFor::FewSamples => say!(
-                    "{count} tiles wait for more samples: of light that one in {} meets, these may have met none",
+                    "{count} of {tiles} tiles wait for more samples: of light that one in {} meets, these may have met none",
                     session.film().total_samples()
                 )?,
-                OpenFor::Doubt => say!("{count} tiles wait since the samples are doubted: see the warnings")?,
+                OpenFor::Doubt => {
+                    say!("{count} of {tiles} tiles wait since the samples are doubted: see the warnings")?
+                }
                 _ => (),
             }
         }

@@ -72,13 +72,23 @@ impl TileState {
         TileMark {
             tile: self.stop.tile,
             value: self.stop.spp as f64,
-            label: match self.open_for.filter(|why| *why != OpenFor::Noise) {
-                Some(why) => format!("{} {}", self.stop.spp, why.name()),
-                None => format!("{}{}", self.stop.spp, if self.open { "+" } else { "" }),
-            },
+            label: format!("{}{}", self.stop.spp, if self.open { "+" } else { "" }),
             unfamiliar: self.stop.unfamiliar,
+            frame: self.open_for.and_then(open_for_colour),
         }
     }
+}
+
+/// Colour and name of what keeps a tile open, in maps as on the live page; `None` of noise.
+pub fn open_for_colour(why: OpenFor) -> Option<([u8; 3], &'static str)> {
+    let colour = match why {
+        OpenFor::Exposure => [90, 170, 255],
+        OpenFor::UnmetLight => [255, 210, 40],
+        OpenFor::FewSamples => [120, 230, 120],
+        OpenFor::Doubt => [255, 90, 90],
+        _ => return None,
+    };
+    Some((colour, why.name()))
 }
 
 /// Samples of each tile, and the scale from the least to the most.
