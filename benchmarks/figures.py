@@ -246,6 +246,50 @@ def films():
     table("films", ["still", "24 fps", "60 fps"], rows)
 
 
+BLACK = """<scene version="3.0.0"><integrator type="path"/>
+<sensor type="perspective"><float name="fov" value="40"/><transform name="to_world"><lookat origin="0,-4,1" target="0,0,0" up="0,0,1"/></transform></sensor>
+<shape type="sphere"><float name="radius" value="0.8"/><bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.5,0.3,0.1"/></bsdf></shape>
+<shape type="rectangle"><transform name="to_world"><scale x="1.5" y="1.5"/><rotate x="1" angle="150"/><translate x="-2" y="-2" z="3"/></transform>
+<emitter type="area"><rgb name="radiance" value="8,8,8"/></emitter></shape></scene>"""
+
+
+def guards():
+    """Samples of the oracle and of its eyes alone, of tiles that end with both. Needs `cargo build -p noisefloor-scenefile --example eyes_alone`."""
+    rows = []
+    with tempfile.NamedTemporaryFile("w", suffix=".xml") as black:
+        black.write(BLACK)
+        black.flush()
+        for scene in ("courtyard", "lanterns", "plates", "cornell-box", "softbox", "bulb", "arcade", "ball on black", "softbox, a dot"):
+            row = [scene]
+            for size, tile in (("128x128", 32), ("256x256", 64)):
+                name = black.name if scene == "ball on black" else scene.removesuffix(", a dot")
+                words = [name, size, tile, 1, 1000, *(["dot"] if scene.endswith("dot") else [])]
+                row += guard_cells(run(pathlib.Path(NOISEFLOOR).parent / "examples/eyes_alone", *words))
+            rows.append(row)
+    table("guards", ["128×128", "eyes alone", "noise decides", "256×256", "eyes alone, 256", "noise decides, 256"], rows)
+
+
+def guard_cells(said):
+    found = dict(line.split(" ", 1) for line in said.splitlines())
+    taken, eyes = float(found["oracle-both"]), float(found["eyes-both"])
+    return [f"{taken:.0f} ({factor(taken / eyes)})", f"{eyes:.0f}", share(int(found.get("noise", 0)) / int(found["tiles"]))]
+
+
+def on_black():
+    """Samples of a ball on black, and with the exposure given that was found: $NOISEFLOOR_OIDN_PYTHON has Open Image Denoise."""
+    rows = []
+    with tempfile.NamedTemporaryFile("w", suffix=".xml") as black:
+        black.write(BLACK)
+        black.flush()
+        for name, *options in (("240×135",), ("240×135, denoised", "--denoise", "oidn"), ("960×540",), ("1920×1080",)):
+            words = ["--size", name.partition(",")[0].replace("×", "x"), "--tile", "32", "--seed", "1", *options]
+            found = rendered(black.name, *words)[0]
+            given = rendered(black.name, *words, "--exposure", found["exposure"])[0]
+            taken, known = (report["samples"] / (report["width"] * report["height"]) for report in (found, given))
+            rows.append([name, f"{taken:.0f} ({factor(taken / known)})", f"{known:.0f}"])
+    table("on-black", ["samples", "with its exposure given"], rows)
+
+
 def large():
     """Time, memory and files of renders of a minute."""
     rows = []

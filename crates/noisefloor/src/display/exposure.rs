@@ -16,7 +16,7 @@ mod block;
 pub(crate) use block::{NoisyBlock, PIXELS};
 
 /// δ of the log-average (Reinhard et al. 2002, eq. 1), as a share of the geometric mean of the luminances
-/// above zero. The paper leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a
+/// above zero. There it keeps black pixels from a logarithm of 0; here, those do not count. The paper leaves δ absolute; a relative one makes the unit of radiance irrelevant, and a
 /// geometric mean withstands fireflies.
 pub(super) const DELTA: f64 = 1e-4;
 
