@@ -231,8 +231,7 @@ macro_rules! with {
     ($($(#[$alias:meta])* $with:ident $field:ident: $type:ty),+) => {
         /// Each returns the same parameters with another value of one.
         impl Params {
-            $(#[doc = concat!("Sets [`Params::", stringify!($field), "`].")]
-            $(#[$alias])*
+            $(#[doc = concat!("Sets [`Params::", stringify!($field), "`].")] $(#[$alias])*
             pub fn $with(self, $field: $type) -> Self {
                 Self { $field, ..self }
             })+
@@ -245,10 +244,8 @@ with!(
     with_tone_mapping tone_mapping: ToneMapping,
     with_viewing viewing: Viewing,
     with_schedule schedule: Schedule,
-    #[doc(alias = "with_min_samples")]
-    with_min_spp min_spp: u64,
-    #[doc(alias = "with_max_samples")]
-    with_max_spp max_spp: u64,
+    #[doc(alias = "with_min_samples")] with_min_spp min_spp: u64,
+    #[doc(alias = "with_max_samples")] with_max_spp max_spp: u64,
     with_consecutive consecutive: u32,
     with_audience audience: Audience
 );
