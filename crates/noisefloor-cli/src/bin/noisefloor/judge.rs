@@ -10,7 +10,6 @@ pub use read::warn_unread;
 
 use crate::output::open_for_colour;
 use anyhow::Context;
-use frames::{Judged, Place};
 use noisefloor::{
     Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
     evidence::{Evidence, Samples},
@@ -23,7 +22,7 @@ use noisefloor_farm::Frames;
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
 use noisefloor_image::{Plane, ReadOptions, RenderLayers, SampleFacts, check_writable, write_exr};
 use read::{read, warn_of};
-use report::Row;
+use report::{Judged, Place, Row};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -1,7 +1,7 @@
 //! Denoised pictures made elsewhere.
 
-use super::frames::{Judged, Place};
 use super::read::{read, warn_of};
+use super::report::{Judged, Place};
 use anyhow::{Context, bail};
 use noisefloor::{
     Rgb, Tile, TileGrid, ToneMapping, Viewing,

@@ -1,5 +1,6 @@
 //! The frames of a sequence, each with its worst place.
 
+use super::report::{Judged, Place};
 use super::{DenoisedJob, JudgeJob, Question};
 use anyhow::Context;
 use noisefloor_cli::say::{say, say_json};
@@ -8,53 +9,11 @@ use noisefloor_farm::Frames;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// A tile, and how bad it is.
-#[derive(Clone, Copy, Serialize)]
-pub(super) struct Place {
-    pub(super) x: usize,
-    pub(super) y: usize,
-    pub(super) width: usize,
-    pub(super) height: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) probability: Option<f32>,
-    /// Of denoised pictures.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) jods_lost: Option<f64>,
-}
-
-/// What was found of a picture.
-#[derive(Serialize)]
-pub(super) struct Judged {
-    tiles: usize,
-    converged_tiles: usize,
-    worst: Option<Place>,
-}
-
 #[derive(Serialize)]
 struct Row {
     frame: i32,
     #[serde(flatten)]
     judged: Judged,
-}
-
-impl Judged {
-    /// Of all tiles, and whether each has converged.
-    pub(super) fn new(tiles: impl Iterator<Item = (bool, Place)>) -> Self {
-        let tiles: Vec<_> = tiles.collect();
-        let good =
-            |place: &Place| place.jods_lost.map_or(f64::from(place.probability.unwrap_or(0.0)), |lost| -lost);
-        let order =
-            |a: &&(bool, Place), b: &&(bool, Place)| a.0.cmp(&b.0).then(good(&a.1).total_cmp(&good(&b.1)));
-        Self {
-            tiles: tiles.len(),
-            converged_tiles: tiles.iter().filter(|(converged, _)| *converged).count(),
-            worst: tiles.iter().min_by(order).map(|(_, place)| *place),
-        }
-    }
-
-    pub(super) fn is_converged(&self) -> bool {
-        self.converged_tiles == self.tiles
-    }
 }
 
 /// Judges all frames, and says what each is like; whether all have converged.
