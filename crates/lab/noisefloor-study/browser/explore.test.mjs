@@ -107,10 +107,7 @@ test("pictures are dropped, judged and disagreed with by mouse, in a small windo
   // The page adjusts to who answers, and says what that changes
   await page.getByText("1 answers: T′ =").waitFor();
   assert.equal(await page.locator("#audience").inputValue(), "you");
-  assert.match(
-    await page.locator("#yours-here").textContent(),
-    /In this picture \d → \d of 6 tiles have converged/,
-  );
+  await page.locator("#yours-here").getByText(/In this picture \d → \d of 6 tiles have converged/).waitFor();
   assert.match(await page.locator("#yours-share").textContent(), /^--audience 0\.\d+,-?\d/);
   await page.locator("#audience").selectOption("observers");
   await until("noise again for the observers", async () => (await label(page, 0)).includes(": noise seen"));
