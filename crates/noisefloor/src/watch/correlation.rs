@@ -232,10 +232,11 @@ impl Sums {
     }
 
     /// What of it counts where samples complete each other. Their noise need not fall with their number, and depends on
-    /// where in its sequence a batch lies; batches of one sequence are not independent.
+    /// where in its sequence a batch lies; batches of one sequence are not independent. Of a large batch, which has less noise
+    /// than many small ones, a mean of both knows less, and so weights by it make the large one brighter ([`Shift`]).
     pub(super) fn of_points(self, one_sequence: bool) -> Self {
-        let Self { neighbours, rows, ends, shift, batches, apart, totals, early, early_energies, .. } = self;
-        let pixels = Self { neighbours, rows, ends, shift, ..Self::default() };
+        let Self { neighbours, rows, ends, batches, apart, totals, early, early_energies, .. } = self;
+        let pixels = Self { neighbours, rows, ends, ..Self::default() };
         if one_sequence { pixels } else { Self { batches, apart, totals, early, early_energies, ..pixels } }
     }
 

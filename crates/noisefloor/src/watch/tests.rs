@@ -526,6 +526,36 @@ fn right_ones_are_silent(seeds: u64) {
     assert!(accused.is_empty(), "{} of {sessions}: {:?}", accused.len(), &accused[..accused.len().min(9)]);
 }
 
+/// Where what is lit covers pixels in part, beside the dark, larger batches of points that complete each other know much more
+/// than smaller ones. They seem brighter, unless it is known that they complete each other.
+#[test]
+fn points_that_complete_each_other_are_not_taken_for_brighter() {
+    let edge = 192;
+    let params = Params { tile: 96, max_spp: 1 << 30, min_spp: 0, ..Params::default() };
+    for known in [true, false] {
+        let mut noise = Noise::new(31);
+        let covered: Vec<f64> = (0..edge * edge)
+            .map(|_| if noise.uniform() < 0.5 { noise.uniform().powi(2) } else { 0.0 })
+            .collect();
+        let mut session = Session::new(edge, edge, FixedSpp(1 << 29), params.clone()).unwrap();
+        session.set_linear();
+        if known {
+            session.set_stratified();
+        }
+        for spp in [4_u32, 4, 4, 4, 4, 4, 4, 4, 32, 64] {
+            let mut lit = |share: f64| {
+                let hits = (0..spp).filter(|&i| (f64::from(i) + noise.uniform()) / f64::from(spp) < share);
+                [(0.003 + hits.count() as f64 / f64::from(spp)) as f32; 3]
+            };
+            let image: Vec<Rgb> = covered.iter().map(|&share| lit(share)).collect();
+            session.push_image(spp.into(), &image).unwrap();
+            session.look().unwrap();
+        }
+        let brighter = session.warnings().iter().any(|warning| matches!(warning, Warning::Encoded(_)));
+        assert_eq!(brighter, !known, "{:?}", session.warnings());
+    }
+}
+
 /// Values that are no means of linear radiance have a mean that depends on the size of the batch.
 #[test]
 fn values_whose_mean_depends_on_the_size_of_a_batch_are_noticed() {
