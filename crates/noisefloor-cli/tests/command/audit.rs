@@ -93,6 +93,10 @@ fn what_cannot_be_audited_says_why() {
         text(&out),
     ]);
     fail(&["audit", text(&out)], &["no tile has stopped for its noise"]);
+    // A tile that the picture does not have
+    let stops = std::fs::read_to_string(out.join("stops.csv")).unwrap();
+    std::fs::write(out.join("stops.csv"), stops.replace("\n0,", "\n9000,")).unwrap();
+    fail(&["audit", text(&out)], &["stops.csv is not as the render wrote it"]);
     // Pictures that are played back have no other samples
     std::fs::create_dir(&stack).unwrap();
     for seed in 0..2 {

@@ -22,11 +22,11 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 /// JODs that a place of a picture that is not denoised may have lost: as much as the worst squares of zones where people
-/// stopped seeing noise (docs/benchmarks/stops.md).
+/// stopped seeing noise.
 pub const PLAIN_JODS_LOST: f64 = 0.5;
 /// Samples of a place that is rendered again, as a multiple of those that it has.
 const TIMES: u64 = 4;
-/// Of places, this share has to keep the limit (docs/denoising.md).
+/// Of places, this share has to keep the limit.
 const PROMISED: f64 = 0.95;
 /// With this confidence, the share is not below the bound that is reported.
 const CONFIDENCE: f64 = 0.95;
@@ -127,6 +127,9 @@ fn look(job: &AuditJob, report: &Value) -> anyhow::Result<Audit> {
     let Ready { params, .. } = render.read()?;
     let stops = csv::Reader::from_path(job.folder.join("stops.csv"))?.into_deserialize();
     let stops: Vec<Stopped> = stops.collect::<Result<_, _>>().context("stops.csv")?;
+    if stops.iter().enumerate().any(|(index, stop)| stop.tile != index) {
+        bail!("stops.csv is not as the render wrote it: a line for each tile, in their order");
+    }
     let drawn = draw(&stops, job.places, job.seed);
     if drawn.is_empty() {
         bail!("no tile has stopped for its noise, or at its samples: there is nothing to audit");
@@ -144,7 +147,7 @@ fn look(job: &AuditJob, report: &Value) -> anyhow::Result<Audit> {
     let picture = read_reference(&job.folder.join(picture_of(&render)), size)?;
     let mut film = Film::new(grid);
     let wanted: Vec<(Tile, u64)> =
-        drawn.iter().map(|(stop, _)| (grid.tile(stop.tile), (TIMES * stop.spp).max(2))).collect();
+        drawn.iter().map(|(stop, _)| (grid.tile(stop.tile), stop.spp.saturating_mul(TIMES).max(2))).collect();
     let progress = if job.quiet { indicatif::ProgressBar::hidden() } else { bar(100, "% of the audit") };
     fill(source.as_mut(), &mut film, &wanted, |done| progress.set_position((100.0 * done) as u64))?;
     progress.finish_and_clear();
