@@ -20,9 +20,9 @@ const LEAST: f64 = 5e-4;
 /// off light, so that larger batches are brighter. Sums grow with n itself.
 ///
 /// Watched is Σd, where d is a batch less the picture before it, of batches much larger than those that the
-/// picture is made of. If all samples are alike and independent, d has the mean 0 at each pixel, whatever the mean of both. Fireflies
-/// skew it, but not towards an alarm: if N of them make all noise, the batch, which has at most as many
-/// samples as the picture, has them all with p ≤ 2⁻ᴺ, and then z = √N.
+/// picture is made of. If all samples are alike and independent, d has the mean 0 at each pixel, whatever the
+/// mean of both. Fireflies skew it, but not towards an alarm: if N of them make all noise, the batch, which has
+/// at most as many samples as the picture, has them all with p ≤ 2⁻ᴺ, and then z = √N.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct Shift {
