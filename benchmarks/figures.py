@@ -87,7 +87,7 @@ def people():
         "nested.error": factor(nested["error_factor"]), "nested.low": factor(nested["error_interval"][0]),
         "nested.high": factor(nested["error_interval"][1]), "nested.calibration": f"{nested['calibration_error']:.3f}",
         "nested.below": share(statistics.mean(float(z["stop_spp"]) < float(z["human_spp"]) for z in zones)),
-        "nested.lisic": factor(math.exp(statistics.mean(lisic))), "median.error": factor(baselines["scene_median"]["error_factor"]),
+        "nested.lisic": factor(math.exp(statistics.mean(lisic))),
         "worst.error": factor(worst(nested)["error_factor"]), "unseen.unfamiliar": str(unseen["unfamiliar_zones"]),
         "table.zones": str(unseen["zones"]), "table.scenes": str(len(unseen["scenes"])), "table.real": f"{unseen['levels_real']:,}",
         "table.synthesised": f"{unseen['levels_synthesised']:,}", "inspect.familiar": f"{inspect['familiar_reach']:.2f}",
