@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Ended by Ctrl-C or SIGTERM, with everything written: 128 + SIGINT.
 pub const INTERRUPTED: u8 = 130;
 
-/// What Ctrl-C does to samples.
 pub const AFTER_THIS_BATCH: &str = "stopping after this batch, and writing what there is";
 
 /// Sets the flag on the first signal, and says how the work ends; a second signal ends the process at once.

@@ -192,7 +192,6 @@ impl<'de> Deserialize<'de> for JobPath {
     }
 }
 
-/// As it is typed.
 pub mod as_typed {
     use super::*;
 

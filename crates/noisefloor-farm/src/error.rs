@@ -31,7 +31,6 @@ pub enum ShardError {
     /// The content is not what was written.
     #[error("it is damaged: {0}")]
     Damaged(String),
-    /// It is of another job.
     #[error("it belongs to another job: its {what} is {kept}, not {now}")]
     Other {
         what: String,
@@ -70,18 +69,13 @@ pub type StudioError = Box<dyn Error + Send + Sync>;
 pub enum FarmError {
     /// A file of the folder cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
-    Read {
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
+    Read { path: PathBuf, source: io::Error },
     /// A file of the folder has another content than it should have.
     #[error("{}: is not what a farm writes: {source}; plan the farm anew in another folder", path.display())]
     Json { path: PathBuf, source: serde_json::Error },
     /// A file of the folder cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// Another release planned the farm.
     #[error(
         "{}: has format version {found}, and this release reads version {PLAN_VERSION}; \
          finish it with the release that planned it, or plan the farm anew in another folder",
@@ -101,7 +95,6 @@ pub enum FarmError {
         .0.display()
     )]
     Locked(PathBuf),
-    /// The source cannot be divided.
     #[error(
         "{0} cannot be rendered on a farm: it does not promise that the same seed repeats its samples; \
          `noisefloor render` renders it on one machine"
@@ -135,7 +128,6 @@ pub enum FarmError {
         /// What it did, and what to do.
         what: String,
     },
-    /// Slurm works on the round.
     #[error(
         "{}: round {number} is under way as Slurm jobs {} and {} ({left} left); \
          `noisefloor farm status` shows how far it is, `scancel {} {}` ends it",
@@ -150,7 +142,6 @@ pub enum FarmError {
         step: String,
         left: usize,
     },
-    /// Rounds that bring nothing.
     #[error(
         "{}: {rounds} rounds in a row brought no samples; see {}, mend what is wrong, and run again",
         path.display(), log.display()
@@ -163,12 +154,7 @@ pub enum FarmError {
     },
     /// A step whose round is over.
     #[error("round {number} has been superseded by round {now}: nothing to do")]
-    Superseded {
-        /// The round of the step.
-        number: usize,
-        /// The round under way.
-        now: usize,
-    },
+    Superseded { number: usize, now: usize },
     /// A task whose round is over, or that it never had.
     #[error("{}: round {number} has no task {task} (any more): nothing to do", path.display())]
     NoTask { path: PathBuf, number: usize, task: usize },
@@ -191,14 +177,9 @@ pub enum FarmError {
     Unknown { path: PathBuf, source: serde_json::Error },
     /// None of the files is a shard.
     #[error("none of these files is a shard; {}: {source}", path.display())]
-    NoShard {
-        path: PathBuf,
-        /// Why it is none.
-        source: ShardError,
-    },
+    NoShard { path: PathBuf, source: ShardError },
     #[error(transparent)]
     Studio(#[from] StudioError),
-    /// Something about one frame.
     #[error("{name}: {source}")]
     Frame { name: String, source: Box<Self> },
 }

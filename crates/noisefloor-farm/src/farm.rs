@@ -55,7 +55,6 @@ pub struct Delivery {
     pub of: usize,
 }
 
-/// How far a farm is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FarmProgress {
     /// The round under way, or the last one.
@@ -63,9 +62,7 @@ pub struct FarmProgress {
     pub tasks: usize,
     /// Tasks whose shards are there.
     pub delivered: usize,
-    /// Jobs that Slurm has left.
     pub slurm_left: Option<usize>,
-    /// Whether every frame is done.
     pub done: bool,
     pub frames: Vec<FrameProgress>,
     /// Seconds since the round was planned.
@@ -73,7 +70,6 @@ pub struct FarmProgress {
     pub seconds: f64,
 }
 
-/// How far a frame is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameProgress {
     pub frame: String,
@@ -83,7 +79,6 @@ pub struct FrameProgress {
     pub spp: f64,
     /// Seconds left, at the pace of the last round.
     pub eta_seconds: Option<f64>,
-    /// How far it is.
     #[serde(flatten)]
     pub state: FrameState,
 }
@@ -112,7 +107,6 @@ impl<'a, S: Studio> Farm<'a, S> {
         farm.folder.write_plan(&farm.plan)
     }
 
-    /// The farm of a folder.
     pub fn open(studio: &'a S, dir: &Path) -> Result<Self, FarmError> {
         let folder = FarmFolder::new(dir);
         let plan = folder.plan()?;
@@ -204,7 +198,6 @@ impl<'a, S: Studio> Farm<'a, S> {
         })
     }
 
-    /// How far it is.
     pub fn progress(&self) -> Result<FarmProgress, FarmError> {
         let (round, names) = (self.folder.round()?, self.plan.names());
         let is_there = |(index, task): (usize, &Task)| {

@@ -31,7 +31,6 @@ struct KeptState {
     state: FrameState,
 }
 
-/// The folder of a farm.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FarmFolder(PathBuf);
 
@@ -81,7 +80,6 @@ impl FarmFolder {
         })
     }
 
-    /// Writes what is rendered.
     pub fn write_plan<J: Serialize>(&self, plan: &FarmPlan<J>) -> Result<(), FarmError> {
         write_json(&self.0.join("farm.json"), plan)
     }
@@ -95,12 +93,10 @@ impl FarmFolder {
         write_json(&self.0.join("round.json"), round)
     }
 
-    /// The folder of a frame.
     pub fn frame(&self, name: &str) -> PathBuf {
         self.0.join(name)
     }
 
-    /// What a frame is.
     pub fn frame_job(&self, name: &str) -> Result<FrameJob, FarmError> {
         let path = self.frame(name).join("frame.json");
         let what = "is missing: the frame was not planned; plan the farm anew in another folder".into();

@@ -13,7 +13,6 @@ use noisefloor::{ProgressiveSource, Repeats, Session};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// When a merge writes pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pictures {
     /// Of frames that are done.
@@ -22,7 +21,6 @@ pub(crate) enum Pictures {
     Always,
 }
 
-/// A frame of a farm.
 pub(crate) struct Frame<'a, S: Studio> {
     pub(crate) studio: &'a S,
     pub(crate) folder: &'a FarmFolder,

@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Problem {
     pub path: PathBuf,
-    /// What is wrong with it.
     pub what: String,
     /// Whether nothing in it can be used.
     pub useless: bool,
@@ -24,7 +23,6 @@ impl fmt::Display for Problem {
     }
 }
 
-/// What a merge has done.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Merged {
     /// Batches added to the film.
@@ -113,7 +111,6 @@ impl ShardSet {
         &self.files
     }
 
-    /// Whether a batch is there.
     pub fn has(&self, batch: &PlannedBatch) -> bool {
         self.index.contains_key(&(batch.tile, batch.first, batch.spp))
     }

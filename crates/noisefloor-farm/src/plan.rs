@@ -12,7 +12,6 @@ const MOST_PIXELS: u64 = 1 << 25;
 /// What one process of a round samples, into one shard.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Task {
-    /// Index of the frame.
     pub frame: usize,
     /// Its batches, in the order of the samples of each tile.
     pub batches: Vec<PlannedBatch>,

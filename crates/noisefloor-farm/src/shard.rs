@@ -34,7 +34,6 @@ pub struct ShardJob {
     pub height: usize,
     /// Edge of the tiles in pixels.
     pub tile: usize,
-    /// Fingerprint of the criterion.
     pub criterion: String,
     /// Parameters of the session, as files keep them.
     pub params: Value,
@@ -100,7 +99,6 @@ impl ShardJob {
     }
 }
 
-/// One batch of a shard.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BatchEntry {
     pub tile: usize,
@@ -131,7 +129,6 @@ struct Header {
     /// Names of scene and source, for people and for the picture's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     names: Option<(String, String)>,
-    /// Seconds in the source.
     seconds: f64,
     batches: Vec<BatchEntry>,
 }
@@ -144,7 +141,6 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// A shard without samples.
     pub fn new(job: ShardJob) -> Self {
         Self {
             header: Header { job, render: Value::Null, names: None, seconds: 0.0, batches: vec![] },
@@ -185,7 +181,6 @@ impl Shard {
         self.header.batches.len()
     }
 
-    /// Whether it has no batches.
     pub fn is_empty(&self) -> bool {
         self.header.batches.is_empty()
     }
@@ -274,7 +269,6 @@ impl ShardFile {
         self.header.names.as_ref().map(|(scene, source)| (scene.as_str(), source.as_str()))
     }
 
-    /// Seconds that the source took.
     pub fn seconds(&self) -> f64 {
         self.header.seconds
     }

@@ -9,7 +9,6 @@ use std::process::Command;
 /// Array jobs have at most this many tasks, unless a cluster allows more (`MaxArraySize`, 1001 by default).
 const MAX_ARRAY: usize = 1000;
 
-/// How rounds are submitted.
 #[derive(Clone, Debug)]
 pub struct Slurm {
     /// The `noisefloor` command, at a path that every node sees.

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Most frames of one farm.
 const MOST_FRAMES: usize = 1_000_000;
 
 /// Frames of a sequence, each once, in ascending order; at least one.
@@ -145,7 +144,6 @@ impl fmt::Display for Frames {
     }
 }
 
-/// What a farm renders.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FarmPlan<J> {
     pub(crate) version: u64,
@@ -193,9 +191,7 @@ impl<J> FarmPlan<J> {
 /// What a frame is, found out when it is planned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameJob {
-    /// Name of the scene.
     pub scene: String,
-    /// Name of the source.
     pub source: String,
     /// What its samples are of.
     pub shards: ShardJob,
@@ -204,11 +200,9 @@ pub struct FrameJob {
     pub waits: bool,
 }
 
-/// How far a frame is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameState {
     pub tiles: usize,
-    /// Tiles that are still open.
     pub open: usize,
     /// Samples in the film, over all pixels.
     pub samples: u64,
@@ -237,7 +231,6 @@ pub enum RoundState {
     OnSlurm(SlurmJobs),
 }
 
-/// The tasks of a round.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Round {
     /// Counts from 1.
@@ -258,7 +251,6 @@ pub struct Round {
 }
 
 impl Round {
-    /// Whether its tasks were started.
     pub fn is_started(&self) -> bool {
         self.state != RoundState::Planned
     }

@@ -58,7 +58,6 @@ pub trait Studio {
 /// A source that is ready to sample.
 pub struct FrameSource {
     pub source: Box<dyn ProgressiveSource>,
-    /// Name of its scene.
     pub scene: String,
 }
 
@@ -73,7 +72,6 @@ pub enum Finished {
     Other,
 }
 
-/// The files of one render.
 pub trait RenderFiles {
     /// The render under way in the folder; none if there is none. Its history is taken up.
     fn checkpoint(&mut self) -> Result<Option<Checkpoint<'static>>, StudioError>;

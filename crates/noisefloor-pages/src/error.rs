@@ -17,12 +17,10 @@ pub enum PagesError {
     /// A language file, or the folder of them, cannot be read.
     #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
     Io {
-        /// The file or folder.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
     },
-    /// A language file is invalid.
     #[error("{}: {what}; docs/studies.md says what a language file holds", path.display())]
     Language {
         path: PathBuf,

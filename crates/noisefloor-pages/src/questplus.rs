@@ -159,7 +159,6 @@ impl QuestPlus {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     pub low: f64,
-    /// Spacing of the values.
     pub step: f64,
     /// Probabilities; they sum to 1.
     pub weights: Arc<[f64]>,

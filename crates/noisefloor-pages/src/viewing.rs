@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Light in the room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ambient {
@@ -36,9 +35,7 @@ pub struct ViewingLimits {
     pub pixels_per_degree: [f64; 2],
     /// Distance of the eyes from the screen, in millimetres.
     pub distance_mm: [f64; 2],
-    /// Gamma of the screen.
     pub gamma: [f64; 2],
-    /// Light in the room.
     pub ambient: Vec<Ambient>,
 }
 
@@ -74,7 +71,6 @@ pub struct Conditions {
     pub screen_height: u32,
     /// Gamma of the screen, from the test chart: 1 to 4.
     pub gamma: f64,
-    /// Light in the room.
     pub ambient: Ambient,
 }
 
@@ -128,9 +124,7 @@ pub enum ViewingProblem {
     Distance,
     /// Pixels too coarse or too fine at that distance.
     PixelsPerDegree,
-    /// Gamma of the screen.
     Gamma,
-    /// Light in the room.
     Ambient,
 }
 

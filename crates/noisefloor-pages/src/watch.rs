@@ -28,7 +28,6 @@ const FILES: [PageFile; 3] = [
     ("watch.css", STYLE, include_str!("../pages/watch/watch.css")),
 ];
 
-/// How far a render is.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct LiveState {
@@ -40,7 +39,6 @@ pub struct LiveState {
     pub seconds: f64,
     /// How many more it is expected to take; `None` while that is not known.
     pub eta_seconds: Option<f64>,
-    /// Whether it has ended.
     pub over: bool,
     /// All tiles, row-major.
     pub tiles: Vec<LiveTile>,
@@ -48,7 +46,6 @@ pub struct LiveState {
     picture: u64,
 }
 
-/// A tile of a render.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct LiveTile {
     /// Left edge in pixels.

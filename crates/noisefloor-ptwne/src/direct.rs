@@ -43,7 +43,6 @@ pub(crate) struct Tracer<'a> {
     seed: u64,
 }
 
-/// A ray of a sample.
 #[derive(Clone, Copy)]
 struct Branch {
     ray: Ray,

@@ -7,16 +7,11 @@ use thiserror::Error;
 #[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// A number is not finite.
     #[error("{what} is not finite; every coordinate, colour and size must be")]
-    NotFinite {
-        /// Which number.
-        what: &'static str,
-    },
+    NotFinite { what: &'static str },
     /// A number is outside its range.
     #[error("{what} is {value}, outside {range}")]
     Range {
-        /// Which number.
         what: &'static str,
         value: f32,
         /// The range it must lie in, as text.
@@ -41,12 +36,7 @@ pub enum SceneError {
     Material(u32),
     /// The number of pixels of an image does not match its size, or is zero or too large.
     #[error("an image of {width}×{height} pixels has {found} values")]
-    Image {
-        width: usize,
-        height: usize,
-        /// Number of values found.
-        found: usize,
-    },
+    Image { width: usize, height: usize, found: usize },
     /// The camera has no orientation: eye and target coincide, or its up vector is parallel to the view.
     #[error("the camera has no orientation: eye and target coincide, or up is parallel to the view")]
     Camera,
@@ -87,7 +77,6 @@ pub enum RenderError {
     /// An option is outside its range.
     #[error("option `{name}` is {value}; it must be {range}")]
     Option {
-        /// The option's name.
         name: &'static str,
         value: usize,
         /// The range it must lie in, as text.
@@ -96,7 +85,6 @@ pub enum RenderError {
     /// The clamp is not a positive, finite radiance.
     #[error("option `clamp` is {0}; it must be a radiance above 0")]
     Clamp(f32),
-    /// Threads could not be started.
     #[error("threads could not be started")]
     Threads(#[source] Box<dyn StdError + Send + Sync>),
     /// The watcher of the reference cancelled it.
@@ -104,7 +92,6 @@ pub enum RenderError {
     Cancelled,
 }
 
-/// A request outside the image.
 #[derive(Debug, Error)]
 #[error("tile {index} reaches to pixel ({right}, {bottom}) of an image of {width}×{height}")]
 pub(crate) struct OutsideError {

@@ -46,7 +46,6 @@ pub(crate) struct Vertices {
 /// All surfaces of a scene, apart from their shapes.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Geometry {
-    /// The group of each surface.
     pub(crate) group_of: Vec<u32>,
     pub(crate) groups: Vec<Group>,
     pub(crate) vertices: Vertices,
@@ -55,7 +54,6 @@ pub(crate) struct Geometry {
 }
 
 impl Geometry {
-    /// The group of a surface.
     #[inline]
     pub(crate) fn group(&self, prim: u32) -> &Group {
         &self.groups[self.group_of[prim as usize] as usize]

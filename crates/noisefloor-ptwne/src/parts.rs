@@ -10,7 +10,6 @@ use crate::math::Vec3;
 use crate::texture::Texture;
 use std::ops::Range;
 
-/// What surrounds a scene.
 #[derive(Clone, Debug)]
 pub(crate) enum Surroundings {
     Sky(Environment),
@@ -27,7 +26,6 @@ pub(crate) struct Object {
     pub(crate) origin: glam::Vec3,
 }
 
-/// The parts of a scene.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Parts {
     pub(crate) surroundings: Option<Surroundings>,

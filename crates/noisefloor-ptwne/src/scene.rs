@@ -128,7 +128,6 @@ impl Scene {
         self.camera
     }
 
-    /// How the camera projects.
     pub fn optics(&self) -> Optics {
         self.optics
     }
@@ -164,7 +163,6 @@ impl Scene {
         self.geometry.group_of.len()
     }
 
-    /// Number of instances of objects.
     pub fn instances(&self) -> usize {
         self.bvh.instances()
     }
@@ -251,7 +249,6 @@ fn sun_of(environment: &Environment) -> Option<Light> {
 
 // Light that reaches a point of the scene: from its emitters, and from what surrounds it.
 
-/// Light that a ray hit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Emitted<'a> {
     pub(crate) radiance: Vec3,

@@ -23,7 +23,6 @@ type Make = fn(&str) -> Result<Scene, SceneError>;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuiltInScene {
-    /// Its name, for [`by_name`].
     pub name: &'static str,
     /// What it shows, in one line.
     pub description: &'static str,

@@ -24,7 +24,6 @@ pub enum Texture {
     Brick {
         /// Colour of the brightest bricks; others are up to 35 % darker.
         brick: Rgb,
-        /// Colour of the mortar.
         mortar: Rgb,
         /// Bricks per unit of u, and courses per unit of v.
         scale: [f32; 2],

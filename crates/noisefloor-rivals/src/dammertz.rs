@@ -8,7 +8,6 @@ use noisefloor::{
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Default of [`Dammertz::stop`].
 pub(crate) const DEFAULT_STOP: f64 = 0.0046;
 /// Default of [`Dammertz::split`] (Dammertz et al. 2010, §2.2).
 const DEFAULT_SPLIT: f64 = 256.0;
@@ -34,7 +33,6 @@ pub struct Dammertz {
     /// Error below which a block is cut in two, in units of `stop`, at least 1; 256 by default.
     pub split: f64,
     blocks: Vec<Block>,
-    /// Whether each tile is done.
     done: Vec<bool>,
 }
 

@@ -6,7 +6,6 @@ use noisefloor::{
     criterion::{CriterionError, View},
 };
 
-/// Default of [`LuxCoreHalt::share`].
 pub(crate) const DEFAULT_SHARE: f64 = 0.31;
 /// Default of [`LuxCoreHalt::threshold`]: one step of an 8-bit screen.
 const DEFAULT_THRESHOLD: f32 = 1.0 / 256.0;

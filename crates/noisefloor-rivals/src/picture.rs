@@ -8,7 +8,6 @@ use thiserror::Error;
 /// Sensible pixels per degree: the filters of a metric grow with them.
 pub(crate) const RESOLUTIONS: RangeInclusive<f64> = 1.0..=1000.0;
 
-/// Why pictures cannot be compared.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum MetricError {
@@ -18,25 +17,13 @@ pub enum MetricError {
     /// The number of pixels does not match the size.
     #[error("a picture of {width}×{height} pixels needs {expected} values, not {got}")]
     Pixels { width: usize, height: usize, expected: usize, got: usize },
-    /// The pictures have different sizes.
     #[error("pictures of {0:?} and {1:?} pixels (width, height) cannot be compared; use the same size")]
     Differ((usize, usize), (usize, usize)),
     /// The pictures are too small for a metric.
     #[error("{metric} needs pictures of at least {least}×{least} pixels, not {width}×{height}")]
-    Small {
-        /// The metric.
-        metric: &'static str,
-        least: usize,
-        width: usize,
-        height: usize,
-    },
-    /// A metric refused the pictures.
+    Small { metric: &'static str, least: usize, width: usize, height: usize },
     #[error("{metric} refused the pictures: {why}")]
-    Refused {
-        /// The metric.
-        metric: &'static str,
-        why: String,
-    },
+    Refused { metric: &'static str, why: String },
     /// A pixel is not finite.
     #[error(
         "pixel ({x}, {y}) of the {picture} is not finite; repair the render or paint over the pixel first"
@@ -47,7 +34,6 @@ pub enum MetricError {
         x: usize,
         y: usize,
     },
-    /// ColorVideoVDP cannot compare them.
     #[error("ColorVideoVDP: {0}")]
     Vision(#[from] VisionError),
     /// The resolution of the viewing condition is out of range.
@@ -108,7 +94,6 @@ pub struct DifferenceMap {
 }
 
 impl DifferenceMap {
-    /// Mean of all values.
     pub fn mean(&self) -> f64 {
         self.values.iter().map(|&v| f64::from(v)).sum::<f64>() / self.values.len() as f64
     }

@@ -112,7 +112,6 @@ fn quantiles(confidence: f64, degrees: usize) -> Vec<f64> {
 /// for any confidence up to 99.9 %.
 const NORMAL: usize = 300;
 
-/// Mean luminance of the picture.
 fn average_luminance(film: &Film) -> f64 {
     let image = film.image();
     image.iter().map(|&p| f64::from(luminance(p))).sum::<f64>() / image.len() as f64

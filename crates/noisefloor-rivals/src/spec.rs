@@ -143,14 +143,12 @@ pub const RIVALS: &[Rival] = &[
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SpecError {
-    /// No criterion of that name.
     #[error("there is no criterion {name:?}; there are {}", known())]
     Unknown { name: String },
     /// Not a number, or one that the criterion cannot take.
     #[error("{spec:?}: {name} takes {wanted}, as in {name}:{example}")]
     Number {
         spec: String,
-        /// The criterion.
         name: &'static str,
         /// What it takes.
         wanted: &'static str,

@@ -17,7 +17,6 @@ pub(crate) const TEMPERATURES: std::ops::RangeInclusive<f64> = 100.0..=1e6;
 /// than D65.
 pub(crate) const EQUAL_ENERGY: Rgb = [1.20479, 0.948_29, 0.908_92];
 
-/// What a spectrum describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Quantity {
     /// A factor on light, such as a reflectance: seen under D65, the white of Rec.709, so that 1 at all

@@ -19,7 +19,6 @@ impl Place {
         Self { path: path.to_owned(), part: None }
     }
 
-    /// A part of a file.
     pub(crate) fn part(path: &Path, part: impl fmt::Display) -> Self {
         Self { path: path.to_owned(), part: Some(part.to_string()) }
     }
@@ -35,12 +34,10 @@ impl fmt::Display for Place {
 }
 
 impl Place {
-    /// [`LoadError::Bad`] here.
     pub(crate) fn bad(self, what: impl fmt::Display) -> LoadError {
         LoadError::Bad { place: self, what: what.to_string() }
     }
 
-    /// [`LoadError::Unsupported`] here.
     pub(crate) fn unsupported(self, what: impl fmt::Display) -> LoadError {
         LoadError::Unsupported { place: self, what: what.to_string() }
     }
@@ -153,10 +150,7 @@ pub enum LoadError {
     Format { path: PathBuf },
     /// This build has no readers.
     #[error("{}: this build reads no scene files: run `cargo run --release --features formats -- render …`", path.display())]
-    LeftOut {
-        /// The file.
-        path: PathBuf,
-    },
+    LeftOut { path: PathBuf },
     /// A file cannot be opened or read.
     #[error("{place} cannot be read")]
     Read {
@@ -174,25 +168,16 @@ pub enum LoadError {
     },
     /// A file asks for something that is not supported and cannot be left out.
     #[error("{place}: {what} is not supported")]
-    Unsupported {
-        place: Place,
-        /// What it asks for.
-        what: String,
-    },
+    Unsupported { place: Place, what: String },
     /// A file names a file outside its own folder.
     #[error("{place}: `{name}` lies outside the folder of the scene; allow a folder by `--scene-root DIR`")]
-    Outside {
-        /// Where it is named.
-        place: Place,
-        name: String,
-    },
+    Outside { place: Place, name: String },
     /// Something is larger than the limit.
     #[error("{place}: {found} {what}, more than {limit}")]
     TooLarge {
         place: Place,
         /// What there is too much of.
         what: &'static str,
-        /// How much there is.
         found: u64,
         limit: u64,
     },
@@ -261,7 +246,6 @@ pub(crate) struct Errors {
     seen: HashSet<String>,
 }
 
-/// Most errors that are collected.
 const MAX_ERRORS: usize = 1000;
 
 impl Errors {
@@ -280,7 +264,6 @@ impl Errors {
         }
     }
 
-    /// Whether all went well.
     pub(crate) fn finish(self) -> Result<(), LoadError> {
         if self.errors.is_empty() { Ok(()) } else { Err(self.into_error()) }
     }

@@ -81,7 +81,6 @@ pub(crate) fn conductor(name: &str) -> Option<(Rgb, Rgb)> {
     find(name).or_else(|| find(name.strip_suffix("_palik")?))
 }
 
-/// The index of that name.
 pub(crate) fn dielectric(name: &str) -> Option<f64> {
     DIELECTRICS.iter().find(|index| index.0 == name).map(|index| index.1)
 }

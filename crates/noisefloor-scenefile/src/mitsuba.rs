@@ -27,7 +27,6 @@ use sensor::View;
 use shapes::Filling;
 use std::path::Path;
 
-/// Loads the scene in `path`.
 pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let document = Document::read(path, options)?;
     let context = Context::new(&document, options)?;

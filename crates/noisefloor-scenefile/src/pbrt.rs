@@ -28,7 +28,6 @@ use crate::loaded::Loaded;
 use crate::options::LoadOptions;
 use std::path::Path;
 
-/// Loads the scene in `path`.
 pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let mut reader = reader::Reader::new(path, options)?;
     reader.file(path, 0)?;

@@ -32,7 +32,6 @@ pub(crate) struct Picture {
     pub(crate) samples: Samples,
 }
 
-/// Pixels of a [`Picture`].
 #[derive(Debug)]
 pub(crate) enum Samples {
     /// Codes of 8 bits with alpha, usually sRGB-encoded. Grey is three equal codes; without alpha, it is 255.
@@ -117,7 +116,6 @@ fn decode_as(
 /// How many pixels a file may have.
 #[derive(Clone, Copy)]
 struct Room<'a> {
-    /// Length of the file.
     bytes: usize,
     /// Most pixels that as many bytes can stand for.
     most: u64,

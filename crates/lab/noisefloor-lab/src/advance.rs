@@ -6,7 +6,6 @@ pub struct Advance<'a> {
     /// What is counted, such as `"zones cut into pairs"`. Another text begins another piece of work.
     pub what: &'static str,
     pub done: u64,
-    /// To do in all.
     pub of: u64,
     /// What is being worked on now; may be empty.
     pub detail: &'a str,

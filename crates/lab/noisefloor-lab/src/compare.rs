@@ -33,7 +33,6 @@ use noisefloor_vision::VisionModel;
 use race::Course;
 use std::sync::atomic::AtomicBool;
 
-/// How criteria are compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting<'a> {
     /// Tiles, tone mapping, viewing conditions and the largest number of samples.

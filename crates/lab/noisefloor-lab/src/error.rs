@@ -12,25 +12,20 @@ use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Why an experiment failed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LabError {
-    /// The source of samples failed.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// A session refused samples.
     #[error(transparent)]
     Session(#[from] SessionError),
     #[error(transparent)]
     Criterion(#[from] CriterionError),
-    /// Parameters out of range.
     #[error(transparent)]
     Params(#[from] ParamsError),
     /// The picture or its tiles have a size out of range.
     #[error(transparent)]
     Tile(#[from] TileError),
-    /// The film refused samples.
     #[error(transparent)]
     Film(#[from] FilmError),
     /// Pictures that a metric cannot compare.
@@ -77,10 +72,7 @@ pub enum LabError {
     },
     /// The reference was cancelled; what there is of it is kept.
     #[error("the reference is not finished: what there is of it is kept in {}, and the next run resumes it", path.display())]
-    Cancelled {
-        /// Where it is kept.
-        path: PathBuf,
-    },
+    Cancelled { path: PathBuf },
     /// The kept reference is of something else.
     #[error("{}: is another reference: {what}; choose another folder, or overwrite it with --force", path.display())]
     OtherReference { path: PathBuf, what: String },
@@ -95,19 +87,10 @@ pub enum LabError {
     TooFewImages { scene: String },
     /// Too few groups of scenes to leave some out.
     #[error("leaving scenes out needs at least 3 groups of scenes; the corpus has {found}: {names}")]
-    TooFewGroups {
-        /// How many there are.
-        found: usize,
-        names: String,
-    },
+    TooFewGroups { found: usize, names: String },
     /// A subset of more pairs than there are.
     #[error("a subset of {asked} pairs is too large: at most {most}, half of the {all} pairs that there are")]
-    Subset {
-        asked: usize,
-        most: usize,
-        /// Pairs that there are.
-        all: usize,
-    },
+    Subset { asked: usize, most: usize, all: usize },
     /// A result that was written reads back as another one.
     #[error("{}: has been changed since it was written; run again", path.display())]
     Changed { path: PathBuf },

@@ -57,7 +57,6 @@ pub fn run(
     Ok(ReproductionReport::new(job, outcomes))
 }
 
-/// Writes reproduce.json and reproduce.md.
 pub fn write_report(folder: &Path, report: &ReproductionReport) -> Result<(), LabError> {
     write_json(&folder.join("reproduce.json"), report)?;
     write_text(&folder.join("reproduce.md"), &report.markdown())?;

@@ -29,7 +29,6 @@ const CONSTANTS: (u32, u32) = (16, 400);
 /// Constants that are tried at the same time.
 const AT_ONCE: usize = 2;
 
-/// A rival on human data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RatedRival {
     /// The name in a spec: `dammertz`.

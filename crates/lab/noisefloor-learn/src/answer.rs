@@ -14,7 +14,6 @@ pub struct Answer {
     pub spp: f64,
     /// The raw descriptor, as long as the table's.
     pub descriptor: Vec<f32>,
-    /// Whether noise is seen.
     pub sees_noise: bool,
 }
 

@@ -26,7 +26,6 @@ pub struct AudienceFit {
     pub pairs: usize,
 }
 
-/// Why there is no line.
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
 pub enum AudienceFitError {
     /// Too few or too many pairs.
@@ -42,7 +41,6 @@ pub enum AudienceFitError {
         observers: f64,
         audience: f64,
     },
-    /// All T are the same.
     #[error("all thresholds of the observers are {0}: a line needs at least two different ones")]
     Constant(f64),
     #[error(

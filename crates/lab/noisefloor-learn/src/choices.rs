@@ -29,7 +29,6 @@ pub const VISIBLE_CHOICES: DescriptorKind = DescriptorKind {
     make: |_| VisibleChoices::new().map(Descriptor::new).map_err(|e| e.to_string()),
 };
 
-/// One of the choices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     pub name: String,

@@ -18,18 +18,11 @@ pub enum TableError {
     Reference { scene: String, zone: u32 },
     /// The descriptor is for tiles of another size.
     #[error("{scene}, zone {zone}: {source}")]
-    Descriptor {
-        scene: String,
-        zone: u32,
-        /// What does not fit.
-        source: noisefloor::descriptor::DescriptorError,
-    },
-    /// The CSV is malformed.
+    Descriptor { scene: String, zone: u32, source: noisefloor::descriptor::DescriptorError },
     #[error("line {line}: {what}")]
     Row {
         /// Line, from 1.
         line: u64,
-        /// What is wrong with it.
         what: String,
     },
     /// The CSV cannot be read or written.

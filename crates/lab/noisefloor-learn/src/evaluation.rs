@@ -25,7 +25,6 @@ pub struct Baselines {
     pub scene_median: PredictionScores,
 }
 
-/// Scores of one scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneScores {
     pub scene: String,
@@ -54,9 +53,7 @@ pub struct Evaluation {
     pub censored_zones: usize,
     /// Zones unlike any that the model which predicts them was tested on.
     pub unfamiliar_zones: usize,
-    /// Levels with a real picture.
     pub levels_real: usize,
-    /// Levels between and beyond them.
     pub levels_synthesised: usize,
 }
 

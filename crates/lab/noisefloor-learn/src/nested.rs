@@ -17,9 +17,7 @@ pub struct Chosen {
     pub without: String,
     /// [`Choice::name`].
     pub choice: String,
-    /// C of the machine.
     pub c: f64,
-    /// γ of the machine.
     pub gamma: f64,
     /// Error factor of the choice on the other groups, each held out from a machine in turn.
     pub error_factor: f64,

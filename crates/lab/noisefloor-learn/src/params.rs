@@ -98,18 +98,11 @@ pub enum TrainError {
         groups: Vec<String>,
         of: usize,
     },
-    /// A parameter out of range.
     #[error("training needs candidates for C and γ, a range above 1 and a spread above 0")]
     Params,
     /// Answers that are not described as the zones are.
     #[error("an answer has {found} numbers, and the zones have {expected}: it is of another descriptor")]
-    Answer {
-        /// Numbers of a zone.
-        expected: usize,
-        /// Numbers of the answer.
-        found: usize,
-    },
-    /// Leaving groups out needs groups.
+    Answer { expected: usize, found: usize },
     #[error("leaving scenes out needs at least {needed} groups of scenes; the corpus has {found}: {names}")]
     Groups { needed: usize, found: usize, names: String },
     /// What was trained is not a model: numbers of the descriptor were removed.

@@ -58,9 +58,7 @@ const CALIBRATION_RANGE: f64 = 8.0;
 /// Levels whose probabilities lie in one tenth of the scale.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReliabilityBin {
-    /// Mean of the predicted probabilities.
     pub predicted: f64,
-    /// Mean of what was observed.
     pub observed: f64,
     pub levels: usize,
 }

@@ -11,7 +11,6 @@ use std::collections::BTreeSet;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Origin {
-    /// Rendered with this many samples.
     Real,
     /// Made from a real picture and a converged one, with noise ∝ 1/√n.
     Synthesised,
@@ -58,7 +57,6 @@ pub struct Table {
     pub descriptor: Descriptor,
     /// What the zones were compared with.
     pub evidence: Evidence,
-    /// How the pictures were displayed.
     pub tone_mapping: ToneMapping,
     /// On which display they were seen, and from how far: an assumption where nobody recorded it.
     pub viewing: Viewing,

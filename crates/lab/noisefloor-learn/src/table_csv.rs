@@ -41,7 +41,6 @@ struct Head {
     viewing: Viewing,
 }
 
-/// Writes a table as CSV.
 pub fn write_table(table: &Table, mut to: impl Write) -> Result<(), TableError> {
     let head = Head {
         descriptor: table.descriptor.spec(),

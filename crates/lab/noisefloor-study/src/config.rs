@@ -13,7 +13,6 @@ use std::path::{Path, PathBuf};
 
 /// Longest study file, in bytes.
 const MAX_FILE: u64 = 1 << 20;
-/// Most stacks of a study.
 pub(crate) const MAX_STACKS: usize = 200;
 /// Most groups of observers, questions, and answers of a choice.
 const MAX_ENTRIES: usize = 40;
@@ -26,9 +25,7 @@ const MAX_TRIALS: u32 = 200;
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Study {
-    /// The task of the observers.
     pub protocol: StudyProtocol,
-    /// File of the answers.
     pub database: PathBuf,
     /// Showings of each pair to each observer (acquisition, validation).
     pub repeats: u32,
@@ -180,7 +177,6 @@ fn is_plain(name: &str) -> bool {
     !name.is_empty() && name.len() <= 64 && !name.chars().any(char::is_control)
 }
 
-/// Numbers, groups, and rules.
 fn check_rules(file: &StudyFile) -> Result<(), String> {
     let within = |name: &str, value: Option<u32>, most: u32| match value {
         Some(value) if !(1..=most).contains(&value) => Err(format!("{name} is {value}, not 1 to {most}")),
@@ -305,7 +301,6 @@ fn check_stacks(file: &StudyFile) -> Result<(), String> {
 
 // What a study file may ask for beside its pictures: texts, questions, and rules that are fixed before
 
-/// The task of the observers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StudyProtocol {
@@ -321,7 +316,6 @@ pub enum StudyProtocol {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Texts {
-    /// Name of the study.
     pub title: String,
     /// The task; empty lines separate paragraphs. The pages add how to answer.
     #[serde(default)]
@@ -363,7 +357,6 @@ pub struct Screening {
     pub minimum_ms: u32,
     /// Trials answered sooner than this count as hasty, in milliseconds.
     pub hasty_ms: u32,
-    /// Largest share of hasty trials.
     pub hasty_share: f64,
     /// Acquisition: largest share of tiles left at the noisiest level.
     pub untouched_share: f64,
@@ -420,7 +413,6 @@ pub struct Question {
     pub option: Vec<AnswerOption>,
 }
 
-/// Kind of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum QuestionKind {
@@ -431,7 +423,6 @@ pub enum QuestionKind {
     Text,
 }
 
-/// One answer of a choice.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AnswerOption {

@@ -19,7 +19,6 @@ pub enum StudyError {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The study file is invalid.
     #[error("{}: {what}; docs/studies.md lists what a study file holds", path.display())]
     File {
         path: PathBuf,
@@ -28,12 +27,7 @@ pub enum StudyError {
     },
     /// A stack has too few or too many pictures.
     #[error("stack {name}: {levels} pictures named by their samples per pixel; a stack needs 2 to {max}")]
-    Levels {
-        name: String,
-        levels: usize,
-        /// Most that are taken.
-        max: usize,
-    },
+    Levels { name: String, levels: usize, max: usize },
     /// A picture differs in size from its stack.
     #[error(
         "{}: {got:?} pixels, but the most converged picture of the stack has {want:?}; \
@@ -44,7 +38,6 @@ pub enum StudyError {
         path: PathBuf,
         /// Its width and height in pixels.
         got: (usize, usize),
-        /// Those of its stack.
         want: (usize, usize),
     },
     /// A picture has pixels that are not finite.
@@ -52,18 +45,12 @@ pub enum StudyError {
     NotFinite { path: PathBuf },
     /// A picture cannot be cut into tiles.
     #[error("stack {name}: {source}")]
-    Tile {
-        name: String,
-        /// Which limit was exceeded.
-        source: TileError,
-    },
+    Tile { name: String, source: TileError },
     /// A folder does not hold a stack.
     #[error(transparent)]
     Stack(#[from] StackError),
-    /// A picture cannot be read.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// A result cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
     /// The answers cannot be read or stored.
@@ -72,10 +59,8 @@ pub enum StudyError {
     /// The server cannot listen on an address, or a language file is invalid.
     #[error(transparent)]
     Pages(#[from] PagesError),
-    /// A stack cannot be rendered.
     #[error("{0}")]
     StackRender(String),
-    /// Pictures cannot be explored.
     #[error("{0}")]
     Explore(String),
     /// The analysis is impossible, for example because there are no answers.
@@ -101,7 +86,6 @@ pub enum StoreError {
     /// The database does not hold disagreements.
     #[error("{}: is not a database of `noisefloor-lab explore`; name another with --database", path.display())]
     NotDisagreements { path: PathBuf },
-    /// No session has this code.
     #[error("no session has the code {0}; check it, or begin a new session")]
     Unknown(String),
     /// The one-time link does not exist.
@@ -110,7 +94,6 @@ pub enum StoreError {
     /// A different event already has this number.
     #[error("event {seq} of session {code} already exists with other content; reload the session")]
     Conflict { code: String, seq: u64 },
-    /// The writer thread has ended.
     #[error("answers can no longer be stored because the database thread has ended; restart the server")]
     Closed,
     /// The stored trials of a session are not of the study.
@@ -118,12 +101,7 @@ pub enum StoreError {
     Plan { code: String },
     /// An event in the database does not fit the study.
     #[error("event {seq} of session {code} does not fit the study: {what}; was the database edited by hand?")]
-    Event {
-        code: String,
-        seq: u64,
-        /// What is wrong with it.
-        what: String,
-    },
+    Event { code: String, seq: u64, what: String },
 }
 
 impl From<StoreError> for Refusal {

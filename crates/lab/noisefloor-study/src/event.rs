@@ -9,14 +9,12 @@ const MAX_CLOCK: u64 = 9_000_000_000_000;
 /// Longest time a trial may take, in milliseconds: a day.
 const MAX_TIME: f64 = 86_400_000.0;
 
-/// One action of an observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum StudyEvent {
     /// Consented. Nothing is shown before.
     Consent {
-        /// Language of the text.
         language: String,
     },
     /// Answered the questions of the study.
@@ -28,7 +26,6 @@ pub enum StudyEvent {
     Conditions(Conditions),
     /// Acquisition: moved one tile by one level.
     Step {
-        /// Number of the trial.
         trial: u32,
         /// Row-major index of the tile.
         tile: u32,
@@ -42,14 +39,12 @@ pub enum StudyEvent {
     },
     /// Acquisition: sees no difference any more.
     Done {
-        /// Number of the trial.
         trial: u32,
         /// When the pictures were shown.
         timing: TrialTiming,
     },
     /// Validation or forced choice: an answer.
     Answer {
-        /// Number of the trial.
         trial: u32,
         choice: Choice,
         /// When the pictures were shown.
@@ -86,7 +81,6 @@ pub struct LoopFrames {
 }
 
 impl TrialTiming {
-    /// Whether the numbers are possible.
     pub(crate) fn is_sane(&self) -> bool {
         let time = |ms: &f64| (0.0..=MAX_TIME).contains(ms);
         self.onset <= MAX_CLOCK

@@ -75,7 +75,6 @@ impl ExploreServer {
         self.listening.address()
     }
 
-    /// Serves until `stop` resolves.
     pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), StudyError> {
         self.listening.serve(self.router, stop).await;
         Ok(())

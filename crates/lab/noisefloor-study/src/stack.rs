@@ -9,20 +9,16 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Most pictures of a stack.
 pub(crate) const MAX_LEVELS: usize = 2000;
 /// The share of the threshold that makes the noisy class (Takouachet et al. 2017, §7.2).
 pub(crate) const NOISY_SHARE: f64 = 0.3;
-/// Most tiles of a picture.
 const MAX_TILES: usize = 1024;
 /// Most pixels of a picture; a larger one would not fit on a screen unscaled.
 const MAX_PIXELS: usize = 16 << 20;
-/// Most frames of a loop.
 const MAX_FRAMES: usize = 240;
 /// Most lines of a table of stops.
 const MAX_STOPS: usize = 100_000;
 
-/// Where a stack comes from.
 pub(crate) struct Source {
     pub(crate) name: String,
     pub(crate) renderer: String,
@@ -114,7 +110,6 @@ impl StudyStack {
         &self.renderer
     }
 
-    /// The folder of its pictures.
     pub fn folder(&self) -> &Path {
         &self.folder
     }

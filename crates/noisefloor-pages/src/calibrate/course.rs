@@ -37,7 +37,6 @@ const BEYOND: f64 = 0.5;
 pub struct CalibrationTrial {
     /// Its number, from 0.
     pub number: u32,
-    /// Which of the tiles.
     pub tile: usize,
     /// Samples per pixel of the noisy picture.
     pub spp: f64,
@@ -45,16 +44,13 @@ pub struct CalibrationTrial {
     pub noisy: usize,
     /// Whether the noise is so strong that whoever looks finds it.
     pub easy: bool,
-    /// Level of the noise.
     level: u32,
 }
 
-/// Where a calibration is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CalibrationStage {
     /// Another trial is to be shown.
     Asking(CalibrationTrial),
-    /// It has found something.
     Found(Factor),
     /// It has found nothing, and says why.
     Refused(CalibrationRefusal),

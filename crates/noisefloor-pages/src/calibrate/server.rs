@@ -47,17 +47,14 @@ const TEXTS: [(&str, &str); 2] = [
 /// Takes what was found, and says where it is kept or why it is not.
 type Keep = Box<dyn Fn(Person) -> Result<String, String> + Send + Sync>;
 
-/// What a calibration needs.
 pub struct CalibrateSetup {
     /// Whose observers somebody is compared with.
     pub oracle: Oracle,
-    /// Name of the person.
     pub name: String,
     /// Day of the measurement, as 2026-11-24.
     pub date: String,
     /// Seed of the order, the places and the noise.
     pub seed: u64,
-    /// Where what was found goes.
     pub keep: Keep,
 }
 
@@ -176,7 +173,6 @@ async fn texts(Path(code): Path<String>) -> Result<Json<BTreeMap<String, String>
     Ok(Json(text))
 }
 
-/// What the page shows.
 #[derive(Serialize)]
 #[serde(tag = "stage", rename_all = "kebab-case")]
 enum PageView {

@@ -61,7 +61,6 @@ pub struct CalibrationTile {
 }
 
 impl CalibrationTile {
-    /// All of them.
     pub fn all() -> &'static [Self] {
         static TILES: OnceLock<Vec<CalibrationTile>> = OnceLock::new();
         TILES.get_or_init(|| FILES.into_iter().filter_map(Self::read).collect())

@@ -60,11 +60,8 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// Type of a page.
 pub const HTML: &str = "text/html; charset=utf-8";
-/// Type of a script.
 pub const SCRIPT: &str = "text/javascript; charset=utf-8";
-/// Type of a style sheet.
 pub const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, type and text of a file.
@@ -81,7 +78,6 @@ pub const LOOK: PageFile = ("style.css", STYLE, include_str!("../../pages/style.
 /// How the display is measured.
 pub const VIEWING: PageFile = ("viewing.js", SCRIPT, include_str!("../../pages/viewing.js"));
 
-/// The file of a name.
 pub fn page_file(files: &[PageFile], name: &str) -> Response {
     match files.iter().find(|(known, ..)| *known == name) {
         Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
@@ -94,7 +90,6 @@ pub fn absent(what: &str) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, what, "path", "go to /")
 }
 
-/// No route has this path.
 pub async fn nothing_here(uri: Uri) -> Refusal {
     let path: String = uri.path().chars().take(100).collect();
     Refusal::new(StatusCode::NOT_FOUND, format!("nothing is at {path}"), "path", "go to /")

@@ -20,7 +20,6 @@ pub(super) struct LocalHit {
 /// Flags the slot of a round surface.
 pub(super) const ROUND: u32 = 1 << 31;
 
-/// A hierarchy over surfaces.
 #[derive(Clone, Debug)]
 pub(crate) struct Bvh {
     pub(super) tree: Tree,

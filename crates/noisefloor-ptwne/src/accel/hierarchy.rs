@@ -101,12 +101,10 @@ impl Instance {
         fits.then_some(Self { object, origin, to_object, to_world: scaled })
     }
 
-    /// The index of its object.
     pub(crate) fn object(&self) -> usize {
         self.object as usize
     }
 
-    /// Moves it in the world.
     pub(crate) fn translate(&mut self, by: Vec3) {
         self.origin += glam::Vec3::from(by);
     }

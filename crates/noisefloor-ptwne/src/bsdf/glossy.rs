@@ -269,7 +269,6 @@ impl<'a> Glossy<'a> {
         self.base != Vec3::ZERO || sheen
     }
 
-    /// Whether light shines through.
     pub(crate) fn transmits(&self) -> bool {
         self.through != Vec3::ZERO
     }

@@ -12,7 +12,6 @@ pub const MAX_INSTANCES: usize = 1 << 22;
 /// Planar surfaces with less area than this, in squared scene units, are left out.
 pub const MIN_AREA: f32 = 1e-18;
 
-/// A material of a [`SceneBuilder`](crate::SceneBuilder).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MaterialId(pub(super) u32);
 
@@ -29,12 +28,10 @@ pub struct Emission {
 }
 
 impl Emission {
-    /// Emission from the front.
     pub fn front(radiance: Rgb) -> Self {
         Self { radiance, texture: None, two_sided: false }
     }
 
-    /// Emission from both sides.
     pub fn two_sided(radiance: Rgb) -> Self {
         Self { two_sided: true, ..Self::front(radiance) }
     }

@@ -470,7 +470,6 @@ impl SceneBuilder {
 
 // Objects of a builder, and their instances.
 
-/// An object of a [`SceneBuilder`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ObjectId(u32);
 

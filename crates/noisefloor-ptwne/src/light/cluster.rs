@@ -85,7 +85,6 @@ impl Cluster {
         self.area > 0.0 && self.spread == 0.0
     }
 
-    /// The bounds of both.
     pub(super) fn union(&self, other: &Self) -> Self {
         let (low, high) = (self.low.min(other.low), self.high.max(other.high));
         let centre = 0.5 * (low + high);

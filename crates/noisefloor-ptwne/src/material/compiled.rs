@@ -32,7 +32,6 @@ pub(crate) enum Reflectance {
     Corners(Option<Box<Texture>>),
 }
 
-/// How a surface scatters light.
 #[derive(Clone, Debug)]
 pub(crate) enum Bsdf {
     Diffuse {

@@ -21,7 +21,6 @@ pub struct Lobes {
     pub specular: Texture,
     /// Factor on a smooth reflection beside that of the facets, 0…1; none with [`Gloss::AshikhminShirley`].
     pub mirror: Texture,
-    /// How the facets reflect.
     pub gloss: Gloss,
     /// Standard deviation of the slopes of the diffuse surface in radians, 0…π/2 (Oren, Nayar 1994); 0 is
     /// Lambertian. [`Gloss::AshikhminShirley`] has none.

@@ -99,7 +99,6 @@ impl Kit {
         self.quad([from[0], y[0], from[1]], along, [0.0, y[1] - y[0], 0.0], m, None);
     }
 
-    /// A box between two corners.
     pub(super) fn cuboid(&mut self, low: P, high: P, m: MaterialId) {
         let size = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
         let centre = [0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])];

@@ -52,7 +52,6 @@ fn number(value: &Value, name: &str, place: &Place) -> Result<f32, LoadError> {
 }
 
 impl Coat {
-    /// Adds the coated material.
     pub(super) fn over(
         self,
         material: Material,

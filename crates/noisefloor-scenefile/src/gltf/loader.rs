@@ -266,7 +266,6 @@ impl Loader<'_> {
     }
 }
 
-/// Where a mesh is.
 struct Pose<'a> {
     to_world: &'a DAffine3,
     joints: Option<&'a Joints>,

@@ -229,7 +229,6 @@ impl<'m> Reader<'m, '_> {
         }
     }
 
-    /// Colour times texture.
     fn colour(
         &mut self,
         factor: Rgb,

@@ -18,7 +18,6 @@ pub(super) enum Corners {
     ColoursAndAlphas,
 }
 
-/// A material in the scene.
 #[derive(Clone, Debug)]
 pub(super) struct AddedMaterial {
     pub(super) id: MaterialId,

@@ -144,7 +144,6 @@ pub(crate) fn parse_with(bytes: &[u8], path: &Path, attribute: Option<&str>) -> 
     Ok(mesh)
 }
 
-/// Names of texture coordinates.
 const UVS: [[&str; 2]; 4] = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
 /// Which channel of the attribute called `name` a property is.
@@ -199,7 +198,6 @@ impl Faces {
     }
 }
 
-/// How numbers are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Ascii,
@@ -207,7 +205,6 @@ enum Format {
     BigEndian,
 }
 
-/// The type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scalar {
     I8,
@@ -367,7 +364,6 @@ fn cut(text: &str) -> String {
     text.trim().chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_WORD).collect()
 }
 
-/// What follows the header.
 #[derive(Debug)]
 struct Body<'a> {
     bytes: &'a [u8],

@@ -9,7 +9,6 @@ use noisefloor::{Rgb, display::srgb_decode};
 
 /// Elements that are colours.
 const COLOURS: [&str; 6] = ["rgb", "srgb", "spectrum", "blackbody", "float", "integer"];
-/// Most samples of a spectrum.
 const MAX_SAMPLES: usize = 1 << 16;
 
 impl<'d> Context<'d> {

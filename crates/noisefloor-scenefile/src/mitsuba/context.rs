@@ -15,7 +15,6 @@ use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::path::PathBuf;
 
-/// Most warnings that are kept.
 const MAX_WARNINGS: usize = 10_000;
 /// Kinds of elements that Mitsuba 3.9 has and this reader has not.
 const MITSUBAS_OWN: [(&str, &str); 17] = [
@@ -97,7 +96,6 @@ impl<'d> Context<'d> {
         Ok(Self { identified, aliases, ..context })
     }
 
-    /// Where `element` is.
     pub(super) fn place(&self, element: &Element) -> Place {
         self.document.place(element)
     }
@@ -364,7 +362,6 @@ impl Context<'_> {
         if result.is_finite() { Ok(result) } else { Err(self.bad(element, "the transform is too large")) }
     }
 
-    /// One step of a transform.
     fn step(&self, step: &Element) -> Result<DMat4, LoadError> {
         match step.tag.as_str() {
             "translate" => Ok(DMat4::from_translation(self.triple(step, 0.0)?)),

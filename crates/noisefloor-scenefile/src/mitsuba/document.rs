@@ -25,7 +25,6 @@ pub(super) struct Document {
     pub(super) files: Vec<PathBuf>,
     /// The first number of its version is below 2.
     pub(super) old: bool,
-    /// The `scene` element.
     pub(super) root: Element,
     /// Where the files are that it names.
     pub(super) folder: Folder,
@@ -53,7 +52,6 @@ impl Document {
         Ok(Self { files: builder.files, old, root, folder: builder.folder })
     }
 
-    /// Where `element` is.
     pub(super) fn place(&self, element: &Element) -> Place {
         Place::part(&self.files[element.origin.file], format_args!("line {}", element.origin.line))
     }

@@ -7,7 +7,6 @@
 use crate::error::{LoadError, Place};
 use std::path::Path;
 
-/// Most attributes of an element.
 const MAX_ATTRIBUTES: u64 = 64;
 
 /// The begin of an element.
@@ -22,7 +21,6 @@ pub(super) struct Start {
 }
 
 impl Start {
-    /// The attribute called `name`.
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
@@ -34,7 +32,6 @@ pub(super) enum Tag {
     End(String),
 }
 
-/// Splits a file into tags.
 #[derive(Debug)]
 pub(super) struct Tags<'a> {
     path: &'a Path,

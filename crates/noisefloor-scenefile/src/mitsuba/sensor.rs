@@ -21,7 +21,6 @@ struct FilmSize {
     shown: (usize, usize),
 }
 
-/// What looks at the scene.
 pub(super) struct View {
     pub(super) camera: Camera,
     pub(super) optics: Optics,

@@ -333,13 +333,11 @@ impl<'d> Context<'d> {
     }
 }
 
-/// A sphere in the scene.
 struct Sphere {
     centre: [f32; 3],
     radius: f32,
     /// The axes of its texture coordinates.
     axes: [[f32; 3]; 3],
-    /// Whether its front is inside.
     inside_out: bool,
 }
 

@@ -28,7 +28,6 @@ impl Attribute {
 /// Attributes that only say what an element is, or what it is called.
 const NAMES: [&str; 4] = ["id", "name", "type", "version"];
 
-/// Where an element begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin {
     /// Index of its file: the scene itself is 0, files that it includes follow.

@@ -8,7 +8,6 @@ use noisefloor_ptwne::{Camera, FovAxis, Optics};
 /// Largest width or height that is read, in pixels.
 const MAX_EDGE: u64 = 1 << 16;
 
-/// A camera and its film.
 #[derive(Clone, Debug)]
 pub(super) struct View {
     /// From the camera, which looks along +z with +y up and +x to the right, to the world.
@@ -85,7 +84,6 @@ impl View {
         Ok(())
     }
 
-    /// Reads a `Film`.
     pub(super) fn film(&mut self, params: &Params) -> Result<(), LoadError> {
         let edge = |name: &str, missing: usize| match params.count(name)? {
             None => Ok(missing),

@@ -13,7 +13,6 @@ use noisefloor_ptwne::{Emission, Environment, Falloff, ImageTexture, Pixels, Pun
 use std::f64::consts::PI;
 
 impl Reader<'_> {
-    /// Adds a `LightSource`.
     pub(super) fn light_source(&mut self, kind: &str, params: &Params) -> Result<(), LoadError> {
         let refused = Self::refused(&params.place);
         let to_world = self.state.to_world;

@@ -11,7 +11,6 @@ use noisefloor_ptwne::{
 };
 use std::rc::Rc;
 
-/// What a material becomes.
 pub(super) enum Made {
     Plain(Material),
     /// Light passes as if there were nothing.

@@ -8,7 +8,6 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
     Numbers(Vec<f64>),
@@ -164,7 +163,6 @@ impl Params {
         self.all.len()
     }
 
-    /// How many numbers there are.
     pub(super) fn numbers_in_all(&self) -> usize {
         let count = |p: &Param| if let Values::Numbers(numbers) = &*p.values { numbers.len() } else { 1 };
         self.all.iter().map(count).sum()
@@ -185,7 +183,6 @@ impl Params {
         self.all.iter().filter(|p| !p.used.get())
     }
 
-    /// All numbers of a parameter.
     pub(super) fn numbers(&self, name: &str) -> Result<Option<&[f64]>, LoadError> {
         match self.get(name).map(|p| &*p.values) {
             None => Ok(None),

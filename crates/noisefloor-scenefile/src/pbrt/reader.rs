@@ -30,7 +30,6 @@ const MAX_BYTES: u64 = 1 << 30;
 const MAX_FILES: u64 = 1 << 18;
 /// Longest file of directives that is kept, in bytes: what is included often is short.
 const KEPT: usize = 1 << 16;
-/// Most warnings that are kept.
 const MAX_WARNINGS: usize = 10_000;
 /// Most pixels of all pictures together.
 const MAX_PIXELS: u64 = 1 << 27;

@@ -89,7 +89,6 @@ pub(super) struct Part {
     pub(super) place: Place,
 }
 
-/// What a shape becomes.
 #[derive(Clone, Debug)]
 pub(super) enum Form {
     Mesh(Triangles),
@@ -138,7 +137,6 @@ impl State {
     }
 }
 
-/// A colour as a texture.
 pub(super) fn plain(colour: Rgb) -> Texture {
     Texture::Colour(colour.map(|c| c.clamp(0.0, 1.0)))
 }

@@ -16,7 +16,6 @@ pub(super) enum Kind {
     Close,
 }
 
-/// Splits a file into tokens.
 pub(super) struct Tokens<'a> {
     rest: &'a str,
     line: u32,
@@ -70,7 +69,6 @@ impl<'a> Tokens<'a> {
         Ok(Some(Token { kind, line }))
     }
 
-    /// Skips white space and comments.
     fn skip_space(&mut self) {
         loop {
             // Exporters of version 3 put commas between numbers

@@ -10,7 +10,6 @@ use noisefloor_image::write_csv;
 use serde::Serialize;
 use std::path::Path;
 
-/// One line of curve.csv.
 #[derive(Serialize)]
 struct CurveRow<'a> {
     scene: &'a str,

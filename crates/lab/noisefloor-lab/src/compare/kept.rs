@@ -95,7 +95,6 @@ pub fn render_reference(
 const PICTURE: &str = "reference.exr";
 const FACTS: &str = "reference.json";
 
-/// A reference under way.
 struct Kept {
     facts: Facts,
     film: Film,

@@ -21,20 +21,17 @@ pub struct CriterionRun {
     pub spp_mean: f64,
     /// Samples per pixel of the tile with most.
     pub spp_most: u64,
-    /// Tiles in the picture.
     pub tiles: usize,
     /// Tiles that the criterion was satisfied with before the limit.
     pub tiles_converged: usize,
     /// Seconds in the source for these samples.
     pub source_seconds: f64,
-    /// Seconds in the criterion.
     pub criterion_seconds: f64,
     /// As in [`Quality`], and so are those that follow.
     pub rel_mse: f64,
     /// In dB.
     pub psnr: f64,
     pub flip: f64,
-    /// Of the worst tile.
     pub flip_worst: f64,
     /// Of the worst block of 16×16 pixels.
     pub flip_worst_block: f64,
@@ -42,9 +39,7 @@ pub struct CriterionRun {
     pub flip_bad_block: f64,
     /// 3-norm.
     pub butteraugli: f64,
-    /// Of the worst tile.
     pub butteraugli_worst: f64,
-    /// Of the worst block.
     pub butteraugli_worst_block: f64,
     /// JOD.
     pub cvvdp_jod: f64,
@@ -53,9 +48,7 @@ pub struct CriterionRun {
     /// Samples that uniform sampling takes until its worst tile is as good, by FLIP, over those of this
     /// criterion. `None` if it does not get there.
     pub uniform_over_this: Option<f64>,
-    /// The same by butteraugli.
     pub uniform_over_this_butteraugli: Option<f64>,
-    /// The same by ColorVideoVDP.
     pub uniform_over_this_cvvdp: Option<f64>,
     /// The same by FLIP, in seconds of the source, over those of source and criterion.
     pub uniform_over_this_seconds: Option<f64>,
@@ -87,7 +80,6 @@ impl CriterionRun {
 pub struct CurvePoint {
     /// Samples per pixel, everywhere.
     pub spp: u64,
-    /// Seconds in the source.
     pub source_seconds: f64,
     /// How far the picture is from the converged one.
     pub quality: Quality,
@@ -103,7 +95,6 @@ pub struct TileStop {
     pub scene: String,
     /// The criterion as it was asked for.
     pub criterion: String,
-    /// Index of the tile.
     pub tile: usize,
     /// Left edge in pixels.
     pub x: usize,
@@ -130,11 +121,9 @@ pub struct Comparison {
     pub runs: Vec<CriterionRun>,
     /// Uniform sampling, by increasing samples.
     pub curve: Vec<CurvePoint>,
-    /// All tiles, criterion by criterion.
     pub tiles: Vec<TileStop>,
 }
 
-/// What a comparison is called.
 #[derive(Clone, Debug)]
 pub struct Labels {
     pub scene: String,

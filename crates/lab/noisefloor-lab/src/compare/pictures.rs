@@ -37,7 +37,6 @@ pub struct Pictures {
     pub crops: Vec<Crop>,
 }
 
-/// What an entrant leaves.
 pub(super) struct Seen<'a> {
     entrant: &'a Entrant,
     /// Display-encoded.

@@ -50,7 +50,6 @@ impl Cost {
     }
 }
 
-/// A plot in two formats.
 #[derive(Clone, Debug)]
 pub struct Plot {
     pub svg: String,

@@ -28,7 +28,6 @@ pub struct Entrant {
     apart: bool,
     /// Seconds in the source for samples of its own.
     own_seconds: f64,
-    /// Seconds in the criterion.
     pub criterion_seconds: f64,
 }
 
@@ -95,14 +94,12 @@ impl Entrant {
     }
 }
 
-/// What came of a run.
 pub(super) struct Race {
     pub(super) entrants: Vec<Entrant>,
     /// Uniform sampling: samples per pixel, and how far the picture then is from the converged one.
     pub(super) curve: Vec<UniformPoint>,
     /// Seconds that one more sample of each pixel of a tile costs, tile by tile.
     pub(super) tile_seconds: Vec<f64>,
-    /// Whether somebody cancelled it.
     pub(super) cancelled: bool,
 }
 

@@ -8,7 +8,6 @@ use plotters::prelude::*;
 use plotters_backend::{BackendColor, BackendCoord, BackendTextStyle, DrawingErrorKind};
 use std::convert::Infallible;
 
-/// Draws plots on a canvas.
 pub(crate) struct Pen<'a>(pub(crate) &'a mut Canvas);
 
 fn font(style: &impl BackendTextStyle) -> MonoFont<'static> {

@@ -24,21 +24,17 @@ use std::time::Instant;
 
 /// Machines that train at once: the solver runs in one thread, and each holds two matrices of up to 0.7 GB.
 const AT_ONCE: usize = 2;
-/// Queries that are timed.
 const QUERIES: usize = 15;
 /// Longest result that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// What a result depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// Of all pairs and their labels.
     pub table_digest: String,
-    /// How a pair is described.
     pub pairs: DescriptorSpec,
     /// What is written into the rows.
     pub scaling: PairScaling,
-    /// Which pairs are asked about.
     pub protocol: PairProtocol,
     pub params: SvmParams,
     pub version: String,
@@ -55,7 +51,6 @@ impl Fingerprint {
         Self { table_digest: digest.to_owned(), pairs: pairs.spec(), scaling, protocol, params, version }
     }
 
-    /// What the result is called.
     pub fn name(&self) -> String {
         format!("{}-{}-{}", self.pairs.name, self.scaling.name(), self.protocol.name())
     }
@@ -71,11 +66,9 @@ impl Fingerprint {
 pub struct Count {
     /// Pairs in which people see noise.
     pub noisy: usize,
-    /// Of these, classified right.
     pub noisy_right: usize,
     /// Pairs that people take for identical.
     pub identical: usize,
-    /// Of these, classified right.
     pub identical_right: usize,
 }
 
@@ -102,16 +95,13 @@ impl Sum for Count {
     }
 }
 
-/// One machine of a protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MachineResult {
     /// What it is asked about, in words.
     pub asked: String,
     pub examples: usize,
-    /// Of them, support vectors.
     pub support_vectors: usize,
     pub seconds_training: f64,
-    /// Synthesised pairs asked about.
     pub synthesised: Count,
     /// Pairs with a real image asked about.
     pub real: Count,
@@ -128,10 +118,8 @@ pub struct QueryCost {
     pub largest_difference: f64,
 }
 
-/// What came of one protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProtocolOutcome {
-    /// What it depends on.
     #[serde(flatten)]
     pub of: Fingerprint,
     /// For the matrix product of all rows, which all protocols share.

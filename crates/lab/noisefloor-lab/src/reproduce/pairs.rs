@@ -50,7 +50,6 @@ pub(super) struct Pairs {
     pub(super) tiles: Array2<f32>,
     pub(super) references: Array2<f32>,
     pub(super) known: Vec<Pair>,
-    /// How many are synthesised.
     pub(super) synthesised: usize,
     scaling: PairScaling,
 }

@@ -8,7 +8,6 @@ use thiserror::Error;
 /// Why a corpus could not be read.
 #[derive(Debug, Error)]
 pub enum CorpusError {
-    /// `thresholds.csv` cannot be read.
     #[error("{}: cannot be read: {source}; a corpus is a folder with thresholds.csv and its stacks", path.display())]
     Io {
         path: PathBuf,
@@ -21,10 +20,8 @@ pub enum CorpusError {
         path: PathBuf,
         /// Line, from 1.
         line: u64,
-        /// What is wrong with it.
         what: String,
     },
-    /// No images for a zone.
     #[error("{}: zone {zone} of {scene} has no images: neither folder {} nor {} is there; add one of them", dir.display(), of_scene.display(), of_zone.display())]
     NoImages {
         dir: PathBuf,
@@ -41,7 +38,6 @@ pub enum CorpusError {
     /// The corpus has no such scene.
     #[error("no scene {scene} in this corpus; it has {known}")]
     Unknown {
-        /// The scene asked for.
         scene: String,
         /// The scenes there are, comma-separated.
         known: String,

@@ -18,7 +18,6 @@ pub enum ZoneImages {
 #[derive(Clone, Debug, PartialEq)]
 pub struct JudgedZone {
     pub scene: String,
-    /// Who rendered the images.
     pub renderer: String,
     /// Row-major number of the zone in the scene.
     pub zone: u32,
@@ -41,6 +40,5 @@ pub struct JudgedZone {
     /// Samples per pixel of the picture that people compared with, if it contains those of the pictures they judged;
     /// infinite if it had no noise. See [`crate::as_noise`].
     pub reference_spp: f64,
-    /// Where its images are.
     pub stack: ZoneImages,
 }

@@ -36,7 +36,6 @@ pub(super) struct Material {
     tile: Tile,
     converged: Pixels,
     converged_spp: f64,
-    /// The scene's noise-free reference.
     reference: Option<Pixels>,
     /// Variance of the rounding of each picture.
     rounding: f64,

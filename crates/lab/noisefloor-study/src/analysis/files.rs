@@ -178,7 +178,6 @@ fn spread(report: &StudyReport) -> String {
     )
 }
 
-/// Text as HTML has it.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

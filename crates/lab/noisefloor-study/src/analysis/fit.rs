@@ -60,7 +60,6 @@ impl Observation {
     }
 }
 
-/// A hypothesis about the spread.
 #[derive(Clone, Copy, Debug)]
 struct Hypothesis {
     median: f64,

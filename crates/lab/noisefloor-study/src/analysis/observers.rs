@@ -13,13 +13,11 @@ use std::sync::Arc;
 /// A tile: index of the stack, and row-major index in it.
 pub type TileKey = (u32, u32);
 
-/// The answers of one observer.
 #[derive(Clone, Debug)]
 pub struct Observer {
     pub code: String,
     /// Group; empty if the study has none.
     pub group: String,
-    /// Identifiers from the address.
     pub ids: BTreeMap<String, String>,
     /// How far the observer has come.
     pub stage: Stage,
@@ -28,7 +26,6 @@ pub struct Observer {
     pub viewing_problem: Option<ViewingProblem>,
     /// Catch trials, and whether they were passed.
     pub caught: Vec<(CatchKind, bool)>,
-    /// How carefully trials were answered.
     pub haste: Haste,
     /// Acquisition: the levels at which the observer left each tile, in order of showing.
     pub stops: BTreeMap<TileKey, Vec<u32>>,
@@ -36,7 +33,6 @@ pub struct Observer {
     pub measured: BTreeMap<TileKey, Posterior>,
     /// Validation: stack, class and whether it was called identical.
     pub judged: Vec<(u32, Class, bool)>,
-    /// Clicks and answers that count.
     pub clicks: u64,
 }
 
@@ -119,7 +115,6 @@ pub(super) fn between(spp: &[u64], level: u32) -> [f64; 2] {
     }
 }
 
-/// All tiles of a study.
 pub fn places(study: &Study) -> Vec<TileKey> {
     let tiles = |(s, stack): (usize, &crate::stack::StudyStack)| {
         (0..stack.grid().len()).map(move |tile| (s as u32, tile as u32)).collect::<Vec<_>>()

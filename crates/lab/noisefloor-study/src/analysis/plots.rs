@@ -18,7 +18,6 @@ const LETTERS: (&str, u32) = ("sans-serif", 15);
 const INK: RGBColor = RGBColor(40, 40, 40);
 const BLUE: RGBColor = RGBColor(0, 114, 178);
 const VERMILION: RGBColor = RGBColor(213, 94, 0);
-/// Points of a curve.
 const POINTS: usize = 120;
 
 fn failed(error: impl std::fmt::Display) -> StudyError {

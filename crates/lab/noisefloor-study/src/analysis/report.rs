@@ -15,7 +15,6 @@ use noisefloor_learn::AudienceFit;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Parameters of an analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AnalysisOptions {
     /// Whether to keep observers whom the rules of the study exclude.
@@ -26,14 +25,10 @@ pub struct AnalysisOptions {
     pub simulated: bool,
 }
 
-/// Everything that an analysis finds.
 #[derive(Clone, Debug, Serialize)]
 pub struct StudyReport {
-    /// Version of noisefloor.
     pub noisefloor: &'static str,
-    /// The protocol of the study.
     pub protocol: StudyProtocol,
-    /// Whether the observers are simulated.
     pub simulated: bool,
     /// All sessions with an answer.
     pub observers: Vec<ObserverRow>,
@@ -65,7 +60,6 @@ pub fn analyse(study: &Arc<Study>, options: AnalysisOptions) -> Result<StudyRepo
     Ok(report(study, &observers, options))
 }
 
-/// Analyses observers already in memory.
 pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -> StudyReport {
     let rows = observer_rows(study, observers);
     let counts = |row: &ObserverRow| options.keep_excluded || row.excluded.is_none();
@@ -88,7 +82,6 @@ pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -
 
 // Validation: how often pairs of each class are called identical (Takouachet et al. 2017, Table 2).
 
-/// One column of the table.
 #[derive(Clone, Debug, Serialize)]
 pub struct ClassRow {
     pub class: Class,
@@ -187,14 +180,12 @@ fn least_squares(pairs: &[(f64, f64)]) -> Option<Audience> {
 
 // The table of observers, with the reasons of those who are excluded.
 
-/// One row per observer.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObserverRow {
     pub code: String,
     pub group: String,
     /// Whether all trials were answered.
     pub finished: bool,
-    /// Clicks and answers that count.
     pub clicks: u64,
     /// Tiles with a threshold.
     pub tiles: usize,
@@ -210,7 +201,6 @@ pub struct ObserverRow {
     pub excluded: Option<String>,
 }
 
-/// One row per observer.
 fn observer_rows(study: &Study, observers: &[Observer]) -> Vec<ObserverRow> {
     let all: Vec<&Observer> = observers.iter().collect();
     let sensitivities = screening::sensitivities(&all, study);

@@ -15,7 +15,6 @@ const SKEWS: [(f64, f64); 7] =
 const REACH: f64 = 12.0;
 const STEPS_PER_UNIT: f64 = 200.0;
 
-/// One shape, as a table.
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
     /// Logarithm of the prior weight.
@@ -26,7 +25,6 @@ pub(super) struct Shape {
     share: Vec<f32>,
 }
 
-/// All shapes considered.
 pub(super) static SHAPES: LazyLock<Vec<Shape>> = LazyLock::new(|| {
     let bases = [Base::Normal, Base::Logistic];
     bases.into_iter().flat_map(|base| SKEWS.map(|(g, weight)| Shape::new(base, g, weight))).collect()

@@ -28,7 +28,6 @@ pub enum CorpusThreshold {
 /// The threshold of one tile. Intervals are `None` for fewer than [`LEAST_OBSERVERS`].
 #[derive(Clone, Debug, Serialize)]
 pub struct TileRow {
-    /// Name of the stack.
     pub stack: String,
     /// Row-major index of the tile.
     pub tile: usize,

@@ -37,14 +37,12 @@ const COLUMNS: &str = "id, picture, name, scene, spp, x, y, width, height, sees_
 pub struct TileAnswer {
     /// Digest of the picture file, hexadecimal.
     pub picture: String,
-    /// File name of the picture.
     pub name: String,
     /// Name of the scene. Pictures of one scene are held out together.
     pub scene: String,
     pub spp: f64,
     /// The tile: x, y, width and height in pixels.
     pub tile: [usize; 4],
-    /// Whether the person sees noise.
     pub sees_noise: bool,
     /// P as displayed, in [0, 1].
     pub probability: f32,
@@ -56,17 +54,14 @@ pub struct TileAnswer {
     pub model: String,
     /// The descriptor computed for the tile.
     pub descriptor: DescriptorSpec,
-    /// Version of the descriptor.
     pub descriptor_version: u16,
     /// What the tile was compared with.
     pub evidence: Evidence,
     pub numbers: Vec<f32>,
 }
 
-/// A stored [`TileAnswer`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Disagreement {
-    /// Row number in the database.
     pub id: i64,
     /// Time of storage, in milliseconds since 1970.
     pub at_ms: u64,
@@ -88,7 +83,6 @@ impl TileAnswer {
     }
 }
 
-/// The database, open for writing.
 #[derive(Debug)]
 pub struct Disagreements {
     path: PathBuf,

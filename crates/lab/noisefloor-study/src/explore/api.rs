@@ -25,7 +25,6 @@ use std::time::Duration;
 
 /// Longest file, in bytes: enough for a picture of the most pixels in 16-bit floats.
 const MAX_FILE: usize = 384 << 20;
-/// Time allowed for an upload.
 const FILE_TIME: Duration = Duration::from_secs(120);
 /// Longest name of a file or a scene, in bytes.
 const MAX_NAME: usize = 200;
@@ -82,7 +81,6 @@ struct StateView {
     art_students: [f64; 2],
     model: ModelView,
     retrained: bool,
-    /// Number of stored disagreements.
     disagreements: usize,
     database: String,
     /// Whether there is a table to retrain on.

@@ -9,14 +9,11 @@ use noisefloor_learn::Table;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Parameters of the explorer.
 #[derive(Debug)]
 pub struct ExploreSetup {
-    /// The model that judges.
     pub model: Model,
     /// Initial probability from which a tile counts as converged.
     pub people: noisefloor::People,
-    /// Initial audience.
     pub audience: Audience,
     /// On which display pictures are seen, and from how far.
     pub viewing: Viewing,
@@ -48,7 +45,6 @@ impl ExploreSetup {
     }
 }
 
-/// State shared by all requests.
 pub(crate) struct App {
     pub(super) setup: ExploreSetup,
     pub(super) kept: Arc<Disagreements>,

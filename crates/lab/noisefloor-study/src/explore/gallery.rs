@@ -14,14 +14,11 @@ use std::path::Path;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Most pictures at once.
 pub(crate) const MAX_PICTURES: usize = 64;
 /// Most pixels of all pictures together; each takes 12 bytes.
 pub(crate) const MAX_GALLERY_PIXELS: usize = 48 << 20;
-/// Most tiles of a picture.
 const MAX_TILES: usize = 1024;
 
-/// Why a picture is refused.
 #[derive(Debug, Error)]
 pub(crate) enum GalleryError {
     #[error("there are {MAX_PICTURES} pictures already; take some away")]
@@ -46,12 +43,10 @@ pub(crate) enum GalleryError {
     Vision(#[from] VisionError),
 }
 
-/// One picture of the gallery.
 #[derive(Clone, Debug)]
 pub struct GalleryPicture {
     /// BLAKE3 digest of the file, hexadecimal: equal files are the same picture, whatever their names.
     pub id: String,
-    /// Name of the file.
     pub name: String,
     /// Whether the samples per pixel are known.
     pub(crate) counted: bool,
@@ -129,7 +124,6 @@ fn samples_of_word(word: &str) -> Option<u32> {
     digits?.parse().ok()
 }
 
-/// The pictures and their relation.
 #[derive(Clone, Debug)]
 pub(crate) struct Gallery {
     /// Ordered by samples per pixel; unknown counts come last.

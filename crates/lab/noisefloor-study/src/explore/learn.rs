@@ -18,7 +18,6 @@ pub struct AnswerAgreement {
     pub left_out: usize,
 }
 
-/// The effect of retraining.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Learned {
     /// Leave-one-scene-out scores on the table, trained only on the table. `None` if it has too few groups
@@ -26,7 +25,6 @@ pub struct Learned {
     pub before: Option<Scores>,
     /// The same, trained on the disagreements as well.
     pub after: Option<Scores>,
-    /// Agreement with the disagreements.
     pub agreement: AnswerAgreement,
     /// Scenes that the disagreements are about.
     pub scenes: Vec<String>,
@@ -36,7 +34,6 @@ pub struct Learned {
     pub model: String,
 }
 
-/// Progress of the work.
 #[derive(Clone, Debug, Serialize)]
 pub struct LearnStep {
     pub done: usize,

@@ -43,7 +43,6 @@ pub(crate) async fn texts(Path(code): Path<String>) -> Response {
     }
 }
 
-/// A file of the page.
 pub(crate) async fn file(Path(name): Path<String>) -> Response {
     page_file(&FILES, &name)
 }

@@ -108,7 +108,6 @@ fn describe(gallery: &Gallery, id: &str, model: &Model, viewing: Viewing) -> Res
     Ok(Tiles { grid, spp, samples: held.samples(), described, still, display, noise })
 }
 
-/// A question about a picture.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Question {
@@ -121,7 +120,6 @@ pub(crate) struct Question {
     pub(crate) retrained: bool,
 }
 
-/// The verdict on a tile.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct TileView {
     pub(crate) tile: usize,
@@ -143,7 +141,6 @@ pub(crate) struct Answered {
     pub(crate) sees_noise: bool,
 }
 
-/// The verdict on a picture.
 #[derive(Debug, Serialize)]
 pub(crate) struct VerdictView {
     pub(crate) picture: String,

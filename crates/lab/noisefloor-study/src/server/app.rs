@@ -19,7 +19,6 @@ const MOST_LIVE: usize = 1000;
 /// A session in memory; `None` until it has been read from the database.
 type Live = Arc<tokio::sync::Mutex<Option<ParticipantSession>>>;
 
-/// State shared by all requests.
 pub(crate) struct App {
     pub(super) study: Arc<Study>,
     pub(super) grids: Arc<Vec<Arc<QuestGrid>>>,
@@ -27,7 +26,6 @@ pub(crate) struct App {
     pub(super) live: Mutex<HashMap<String, Live>>,
     pub(super) tiles: TileCache,
     pub(super) guard: Arc<Guard>,
-    /// Whether simulated observers are admitted.
     pub(super) simulated: AtomicBool,
     /// Opens the experimenter's page.
     pub(super) key: String,

@@ -33,7 +33,6 @@ pub struct Overview {
 #[derive(Debug, Serialize, Deserialize)]
 pub struct OverviewRow {
     pub code: String,
-    /// Identifiers from the address.
     pub ids: BTreeMap<String, String>,
     pub group: String,
     /// `active`, `idle`, `paused`, `dropped-out`, `screened-out` or `finished`.

@@ -27,12 +27,10 @@ const FILES: [PageFile; 12] = [
     LOOK,
 ];
 
-/// The page of the participants.
 pub(crate) async fn page() -> Response {
     ([(CONTENT_TYPE, HTML)], PAGE).into_response()
 }
 
-/// A file of the pages.
 pub(crate) async fn file(name: Option<Path<String>>) -> Response {
     let name = name.map(|Path(name)| name).unwrap_or_default();
     page_file(&FILES, &name)

@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 /// What a page has to know about a study.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct StudyView {
-    /// The task of the observers.
     pub protocol: StudyProtocol,
     /// Groups that observers choose from.
     pub groups: Vec<String>,
@@ -29,13 +28,10 @@ pub struct StudyView {
     pub links_only: bool,
     /// Query parameters kept as opaque identifiers.
     pub id_parameters: Vec<String>,
-    /// Questions before the trials.
     pub questions: Vec<Question>,
-    /// Shapes of the pictures.
     pub stacks: Vec<StackView>,
 }
 
-/// A language of the pages.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LanguageView {
     /// Name of the language, in the language.
@@ -43,7 +39,6 @@ pub struct LanguageView {
     pub direction: Direction,
 }
 
-/// The shape of a stack.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StackView {
     pub width: usize,
@@ -59,7 +54,6 @@ pub struct StackView {
 }
 
 impl StackView {
-    /// The shape of a stack.
     pub fn of(stack: &StudyStack) -> Self {
         let grid = stack.grid();
         let levels = stack.levels().to_vec();
@@ -92,7 +86,6 @@ impl StudyView {
     }
 }
 
-/// Where a session is.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct SessionView {
     pub code: String,
@@ -100,7 +93,6 @@ pub struct SessionView {
     pub next_seq: u64,
     /// How far the observer has come.
     pub stage: Stage,
-    /// Whether the observer has paused.
     pub paused: bool,
     pub done: u32,
     pub total: u32,
@@ -116,7 +108,6 @@ pub struct SessionView {
     pub conditions: Option<Conditions>,
     /// Which of them the study does not accept.
     pub viewing_problem: Option<ViewingProblem>,
-    /// The trial to show.
     pub trial: Option<Trial>,
     /// After the session has ended: what the observer is given.
     pub completion: Option<CompletionView>,

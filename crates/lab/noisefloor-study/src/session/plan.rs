@@ -18,7 +18,6 @@ pub struct Plan {
     pub(super) trials: Vec<PlannedTrial>,
 }
 
-/// A trial as planned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlannedTrial {

@@ -52,7 +52,6 @@ pub(super) struct Practice {
     passed: u32,
 }
 
-/// How carefully trials were answered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Haste {
     /// Trials after the practice.
@@ -84,7 +83,6 @@ pub(super) enum Shown {
     },
 }
 
-/// The state of a session.
 #[derive(Clone, Debug)]
 pub struct ParticipantSession {
     pub(super) study: Arc<Study>,
@@ -395,12 +393,10 @@ impl ParticipantSession {
         self.stage
     }
 
-    /// Whether the observer is simulated.
     pub(crate) fn is_simulated(&self) -> bool {
         self.simulated
     }
 
-    /// Whether the observer has paused.
     pub(crate) fn is_paused(&self) -> bool {
         self.paused
     }
@@ -425,7 +421,6 @@ impl ParticipantSession {
         }
     }
 
-    /// Rounds of practice begun.
     pub fn practice_rounds(&self) -> u32 {
         self.practice.rounds
     }
@@ -435,7 +430,6 @@ impl ParticipantSession {
         self.plan.get(self.at as usize).map(|planned| planned.role)
     }
 
-    /// Viewing conditions, as last reported.
     pub fn conditions(&self) -> Option<&Conditions> {
         self.conditions.as_ref()
     }

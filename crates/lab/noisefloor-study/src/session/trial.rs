@@ -23,7 +23,6 @@ pub enum CatchKind {
     Obvious,
 }
 
-/// What a trial is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrialRole {
@@ -41,7 +40,6 @@ pub enum Trial {
     Acquisition {
         /// Number of the trial, from 0.
         number: u32,
-        /// Whether it is practice.
         practice: bool,
         stack: u32,
         /// Level of each tile.
@@ -53,7 +51,6 @@ pub enum Trial {
     Validation {
         /// Number of the trial, from 0.
         number: u32,
-        /// Whether it is practice.
         practice: bool,
         stack: u32,
         /// Level of each tile of the left picture.
@@ -65,7 +62,6 @@ pub enum Trial {
     ForcedChoice {
         /// Number of the trial, from 0.
         number: u32,
-        /// Whether it is practice.
         practice: bool,
         stack: u32,
         tile: u32,

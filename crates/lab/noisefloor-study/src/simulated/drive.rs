@@ -16,13 +16,7 @@ pub enum DriveError {
     #[error("{url}: no answer: {source}; is `noisefloor-lab study serve` running there?")]
     Http { url: String, source: Box<ureq::Error> },
     #[error("{url}: refused with status {status}: {body}")]
-    Refused {
-        /// What was asked for.
-        url: String,
-        status: u16,
-        /// What the server said.
-        body: String,
-    },
+    Refused { url: String, status: u16, body: String },
     /// The study does not accept the viewing conditions of simulated observers.
     #[error(
         "simulated observers sit 600 mm from a screen of 96 dpi in a dim room; [viewing] does not allow it"
@@ -30,12 +24,7 @@ pub enum DriveError {
     Outside,
     /// The reply is not valid for this version.
     #[error("{url}: not the JSON expected: {source}; is the server of the same version?")]
-    Json {
-        /// What was asked for.
-        url: String,
-        /// What is wrong with it.
-        source: serde_json::Error,
-    },
+    Json { url: String, source: serde_json::Error },
 }
 
 /// Sends one request: GET without a body, POST with one.

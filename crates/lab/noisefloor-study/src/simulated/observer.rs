@@ -38,10 +38,8 @@ pub struct Public {
 /// Shape of the spread between observers, in ln(spp), with median 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SpreadShape {
-    /// Logistic.
     #[default]
     Logistic,
-    /// Normal.
     Normal,
     /// Lognormal with σ = ½: skewness 1.75, a long tail of demanding observers.
     Lognormal,

@@ -53,7 +53,6 @@ pub struct NewSession {
     pub plan: Plan,
     /// Group of observers; empty if the study defines none.
     pub group: String,
-    /// Whether the observer is simulated.
     pub simulated: bool,
     /// Opaque identifiers from the address.
     pub ids: BTreeMap<String, String>,

@@ -16,7 +16,6 @@ use noisefloor_rivals::Rival;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// What to score: checked.
 pub struct EvaluateJob {
     pub data: DataJob,
     pub search: SearchJob,

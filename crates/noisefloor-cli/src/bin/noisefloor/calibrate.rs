@@ -14,7 +14,6 @@ pub struct Simulated {
     pub seed: u64,
 }
 
-/// What is done: checked.
 #[cfg_attr(not(feature = "watch"), allow(dead_code, reason = "refused without web server"))]
 pub enum CalibrateTask {
     Show(PathBuf),

@@ -387,7 +387,6 @@ fn status(dir: &Path, json: bool) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// One line about a round.
 fn say_round(round: &Round) -> Result<(), NotSaid> {
     let batches: usize = round.tasks.iter().map(|task| task.batches.len()).sum();
     let mut frames: Vec<usize> = round.tasks.iter().map(|task| task.frame).collect();
@@ -404,7 +403,6 @@ fn say_frames(frames: &[FrameProgress]) -> Result<(), NotSaid> {
     frames.iter().try_for_each(|known| say_frame(&known.frame, known.eta_seconds, &known.state))
 }
 
-/// One line about a frame.
 fn say_frame(frame: &str, eta_seconds: Option<f64>, state: &FrameState) -> Result<(), NotSaid> {
     let FrameState { tiles, open, samples, sampled, rounds, done, .. } = state;
     if *tiles == 0 {

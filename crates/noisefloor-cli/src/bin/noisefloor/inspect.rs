@@ -12,7 +12,6 @@ use noisefloor_cli::say::{NotSaid, say, say_json};
 use noisefloor_ptwne::scenes;
 use serde::Serialize;
 
-/// A model to show.
 pub struct InspectJob {
     pub model: Model,
     pub json: bool,

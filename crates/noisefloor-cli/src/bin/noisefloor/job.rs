@@ -93,7 +93,6 @@ impl RenderJob {
         Ok(all)
     }
 
-    /// Reads model and LUT.
     pub fn read(&self) -> anyhow::Result<Ready> {
         let oracle = match &self.criterion {
             CriterionJob::Oracle { model, people, scatter } => {

@@ -27,7 +27,6 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Pictures to judge: checked.
 #[derive(Clone)]
 pub struct JudgeJob {
     /// With its samples per pixel; without them, the file says how many.
@@ -51,7 +50,6 @@ pub struct JudgeJob {
     pub exr: Option<PathBuf>,
 }
 
-/// What `judge` is asked.
 pub enum Question {
     Noise(Box<JudgeJob>),
     Denoised(Box<DenoisedJob>),
@@ -161,7 +159,6 @@ fn rows(grid: TileGrid, spp: f64, judged: &JudgedTiles, unlike: &[bool]) -> Vec<
     grid.tiles().zip(judged.verdicts()).map(row).collect()
 }
 
-/// Draws what was asked for.
 fn draw(
     job: &JudgeJob,
     image: &Still,

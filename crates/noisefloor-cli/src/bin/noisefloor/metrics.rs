@@ -20,7 +20,6 @@ const MOST_PIXELS: usize = 7680 * 4320;
 /// Memory that the metrics take, measured at 1.6 and at 65 megapixels.
 const BYTES_A_PIXEL: usize = if cfg!(feature = "metrics") { 300 } else { 120 };
 
-/// Two pictures to compare: checked.
 pub struct MetricsJob {
     pub image: PathBuf,
     pub reference: PathBuf,

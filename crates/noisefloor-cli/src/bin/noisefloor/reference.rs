@@ -17,7 +17,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// A reference to render: checked.
 pub struct ReferenceJob {
     pub source: SourceJob,
     pub resources: Resources,

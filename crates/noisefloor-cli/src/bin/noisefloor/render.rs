@@ -234,7 +234,6 @@ fn take_up(driver: Rendering, output: &mut Output, quiet: bool) -> anyhow::Resul
     Ok(driver)
 }
 
-/// Where a render is watched.
 struct Views {
     tev: Option<Tev>,
     #[cfg(feature = "watch")]

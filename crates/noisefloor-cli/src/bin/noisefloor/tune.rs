@@ -81,7 +81,6 @@ pub fn run(mut job: TuneJob) -> anyhow::Result<ExitCode> {
     Ok(if matches!(ending, Ending::Found { .. }) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// What a search looks at.
 struct Tune<'a> {
     job: &'a TuneJob,
     keep: Option<Keep>,

@@ -8,7 +8,6 @@ use noisefloor_cli::say::{NotSaid, say, say_json};
 use serde::Serialize;
 use std::path::Path;
 
-/// One line of the verdict.
 #[derive(Serialize)]
 pub(super) struct Row {
     pub(super) tile: usize,

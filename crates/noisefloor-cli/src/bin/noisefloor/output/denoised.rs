@@ -16,7 +16,6 @@ use std::time::Instant;
 /// one in 250,000 finds is then 2·10⁻⁴.
 const MANY: u64 = 1 << 21;
 
-/// The denoiser of a render.
 pub struct Denoised {
     denoiser: Box<dyn Denoiser>,
     /// Albedo and normals of both halves together, and whether they are clean.
@@ -127,7 +126,6 @@ impl Output {
         Ok(())
     }
 
-    /// Says what denoising was worth.
     pub(super) fn say_denoised(&self, session: &Session) -> Result<(), NotSaid> {
         let Some(denoised) = &self.denoised else { return Ok(()) };
         let DenoisedReport {

@@ -7,7 +7,6 @@ use noisefloor_image::maps::{Canvas, NOISE_SCALE, draw_field, draw_tiles};
 use noisefloor_image::{Plane, RenderLayers, SampleFacts, write_exr};
 
 impl Output {
-    /// Writes the pictures so far.
     pub fn write_pictures(&mut self, session: &Session) -> anyhow::Result<()> {
         self.forget_earlier()?;
         let tiles = states(session);

@@ -60,7 +60,6 @@ impl TileState {
         !self.open && (reason.is_final() || reason == StopReason::SourceExhausted)
     }
 
-    /// A line of the table.
     pub(super) fn row(&self) -> StopRow {
         let Stop { tile: Tile { index, x, y, width, height }, spp, probability, unfamiliar, .. } = self.stop;
         let (tile, reason) = (index, self.reason());

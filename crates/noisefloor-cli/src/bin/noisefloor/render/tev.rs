@@ -17,7 +17,6 @@ const PAUSE: Duration = Duration::from_millis(500);
 /// The picture, and what is known of each tile, as in image.exr.
 const CHANNELS: [&str; 5] = ["R", "G", "B", "oracle.spp", "oracle.P"];
 
-/// A picture in tev.
 pub struct Tev {
     client: TevClient,
     name: String,

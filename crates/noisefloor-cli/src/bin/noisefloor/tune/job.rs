@@ -12,7 +12,6 @@ use std::path::PathBuf;
 /// Edge of the tiles in which noise is described: windows are what is judged, whatever the tiles.
 pub(super) const TILE: usize = 64;
 
-/// A setting to find: checked.
 pub struct TuneJob {
     pub source: SourceJob,
     /// The frames of a sequence that are looked at; none if it is one picture.
@@ -34,7 +33,6 @@ pub struct TuneJob {
     pub quiet: bool,
 }
 
-/// What is judged.
 pub enum TuneCriterion {
     /// The noise of the picture.
     Noise(Box<Oracle>),

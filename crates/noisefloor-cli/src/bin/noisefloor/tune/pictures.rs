@@ -53,7 +53,6 @@ impl Pair {
     }
 }
 
-/// A part of a picture.
 pub struct Crop {
     pub tile: Tile,
     /// With the exposure of the whole.
