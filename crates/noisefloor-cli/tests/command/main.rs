@@ -1,82 +1,33 @@
 //! Tests of the two commands as they are run: exit codes, files, and one line an error. One module a
 //! subject; they need `--all-features`.
+#![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
-/// Lines from one public to another.
-#[cfg(test)]
-mod audience;
-/// Whether renders keep what they promise.
-#[cfg(test)]
-mod audit;
-/// One line, no panic, nothing lost.
-#[cfg(test)]
-mod bad_input;
-/// One's own eyes.
-#[cfg(test)]
-mod calibrate;
-/// Criteria side by side.
-#[cfg(test)]
-mod compare;
-/// Kills, full disks, folders that nobody can write.
-#[cfg(test)]
-mod crash;
-/// Renders that are judged denoised.
-#[cfg(test)]
-mod denoise;
-/// Many processes, kills, rubbish.
-#[cfg(test)]
+mod audience; // lines from one public to another
+mod audit; // whether renders keep what they promise
+mod bad_input; // one line, no panic, nothing lost
+mod calibrate; // one's own eyes
+mod compare; // criteria side by side
+mod crash; // kills, full disks, folders that nobody can write
+mod denoise; // renders that are judged denoised
 #[cfg(target_os = "linux")]
-mod farm;
-/// Output folders that are taken, and scenes that were edited.
-#[cfg(test)]
-mod folders;
-/// Every subcommand explains itself.
-#[cfg(test)]
-mod frames;
-mod help;
-/// Verdicts on pictures.
-#[cfg(test)]
-mod judge;
-/// Running the command.
-#[cfg(test)]
-mod kit;
-/// Train, inspect, evaluate.
-#[cfg(test)]
-mod learn;
-/// Published metrics of two pictures.
-#[cfg(test)]
-mod metrics;
-/// The quick reference alone.
-#[cfg(test)]
-mod reference;
-/// What is written, and that it is the same again.
-#[cfg(test)]
-mod render;
-/// The paper's protocols: run, resumed, refused.
-#[cfg(test)]
-mod reproduce;
-/// Where results cannot go, and where nobody reads them.
-#[cfg(test)]
+mod farm; // many processes, kills, rubbish
+mod folders; // output folders that are taken, and scenes that were edited
+mod frames; // sequences, resumed and shared
+mod help; // every subcommand explains itself
+mod judge; // verdicts on pictures
+mod kit; // running the command
+mod learn; // train, inspect, evaluate
+mod metrics; // published metrics of two pictures
+mod reference; // the quick reference alone
+mod render; // what is written, and that it is the same again
+mod reproduce; // the paper's protocols: run, resumed, refused
 #[cfg(target_os = "linux")]
-mod say;
-/// Ctrl-C, and worse.
-#[cfg(test)]
-mod signals;
-/// A real Slurm.
-#[cfg(test)]
+mod say; // where results cannot go, and where nobody reads them
+mod signals; // Ctrl-C, and worse
 #[cfg(target_os = "linux")]
-mod slurm;
-/// Other renderers than our own.
-#[cfg(test)]
-mod sources;
-/// Stacks, links, raw data and copies of a study.
-#[cfg(test)]
-mod study;
-/// What the screen shows: LUTs.
-#[cfg(test)]
-mod tone;
-/// A renderer's own setting.
-#[cfg(test)]
-mod tune;
-/// Renders that are watched.
-#[cfg(test)]
-mod watch;
+mod slurm; // a real Slurm
+mod sources; // other renderers than our own
+mod study; // stacks, links, raw data and copies of a study
+mod tone; // what the screen shows: LUTs
+mod tune; // a renderer's own setting
+mod watch; // renders that are watched

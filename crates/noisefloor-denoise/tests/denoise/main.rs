@@ -1,17 +1,11 @@
 //! Tests of the crate as others see it.
 #![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
-/// The criterion, in sessions.
-mod criterion;
-/// The estimate, against truths that are known.
-mod estimate;
+mod criterion; // the criterion, in sessions
+mod estimate; // the estimate, against truths that are known
 mod excess;
-/// Albedo and normals of halves.
-mod guides;
-/// Synthetic scenes and simple denoisers.
-mod kit;
-/// Mirror images, and their mean.
-mod mirrored;
-/// Open Image Denoise itself, where it is installed.
+mod guides; // albedo and normals of halves
+mod kit; // synthetic scenes and simple denoisers
+mod mirrored; // mirror images, and their mean
 #[cfg(feature = "oidn")]
-mod oidn;
+mod oidn; // Open Image Denoise itself, where it is installed

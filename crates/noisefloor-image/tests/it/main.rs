@@ -1,29 +1,12 @@
 //! Tests of noisefloor-image, one module a subject.
+#![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
-/// Colours that files state.
-#[cfg(test)]
-mod colours;
-/// LUTs: known answers, and what is refused.
-#[cfg(test)]
-mod cube;
-/// What EXRs say of their samples.
-#[cfg(test)]
-mod facts;
-/// Broken files: every byte flip and cut is an error or a picture, never a panic.
-#[cfg(test)]
-mod hostile;
-/// What is read from PFM, and what is refused.
-#[cfg(test)]
-mod pfm;
-/// What is read from EXR and PNG.
-#[cfg(test)]
-mod read;
-/// Playback of stacks.
-#[cfg(test)]
-mod stack;
-/// Files that others make, for the tests to read.
-#[cfg(test)]
-mod util;
-/// Round trips and atomic writing.
-#[cfg(test)]
-mod write;
+mod colours; // colours that files state
+mod cube; // LUTs: known answers, and what is refused
+mod facts; // what EXRs say of their samples
+mod hostile; // broken files: every byte flip and cut is an error or a picture, never a panic
+mod pfm; // what is read from PFM, and what is refused
+mod read; // what is read from EXR and PNG
+mod stack; // playback of stacks
+mod util; // files that others make, for the tests to read
+mod write; // round trips and atomic writing

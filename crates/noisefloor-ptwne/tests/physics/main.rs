@@ -4,10 +4,7 @@
 //! standard errors, estimated from at least 64 batches. By Student's t with 63 degrees of freedom, a correct
 //! renderer fails one such comparison by chance with p = 5e-6. The whole suite makes about a hundred: 5e-4.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a panic in a test is how a test fails; clippy.toml covers test functions alone"
-)]
+#![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
 mod determinism; // threads, batches, seeds, independence
 mod direct; // direct light in closed form, and the reference
@@ -22,6 +19,6 @@ mod mixes; // choices between materials, and between a surface and what lies beh
 mod models; // glTF's, Mitsuba's and pbrt's layered surfaces
 mod points; // spots and projectors
 mod reference; // how free of noise the reference is
-mod relief;
-mod sampling; // normal maps, bumps, coats, colours of corners
+mod relief; // normal maps, bumps, coats, colours of corners
+mod sampling;
 mod stiff; // scenes with known trouble

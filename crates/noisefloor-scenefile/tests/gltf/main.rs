@@ -2,10 +2,7 @@
 //!
 //! Renders are seeded; where they have noise, a tolerance is at least four standard errors.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a panic in a test is how a test fails; clippy.toml covers test functions alone"
-)]
+#![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
 mod bad; // bad files, and what is said of them
 mod draco; // compressed meshes

@@ -35,26 +35,36 @@ fn all_fail(bodies: &[(String, &str)]) {
 }
 
 fn mesh(kind: &str, name: &str) -> String {
-    format!("\n<shape type=\"{kind}\"><string name=\"filename\" value=\"{name}\"/></shape>")
+    format!("\n<shape type='{kind}'><string name='filename' value='{name}'/></shape>")
 }
 
 fn bitmap(name: &str) -> String {
-    bsdf(&format!(
-        "<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\">\
-         <string name=\"filename\" value=\"{name}\"/></texture></bsdf>"
-    ))
+    let file = format!("<string name='filename' value='{name}'/>");
+    diffuse(&format!("<texture type='bitmap' name='reflectance'>{file}</texture>"))
+}
+
+fn diffuse(inside: &str) -> String {
+    of("diffuse", inside)
+}
+
+fn of(kind: &str, inside: &str) -> String {
+    bsdf(&format!("<bsdf type='{kind}'>{inside}</bsdf>"))
+}
+
+fn shape(kind: &str, inside: &str) -> String {
+    format!("<shape type='{kind}'>{inside}</shape>")
 }
 
 fn bsdf(inside: &str) -> String {
-    format!("<shape type=\"rectangle\">\n{inside}</shape>")
+    format!("<shape type='rectangle'>\n{inside}</shape>")
 }
 
 fn light(inside: &str) -> String {
-    format!("<shape type=\"rectangle\"><emitter type=\"area\">\n{inside}</emitter></shape>")
+    format!("<shape type='rectangle'><emitter type='area'>\n{inside}</emitter></shape>")
 }
 
 fn move_by(inside: &str) -> String {
-    format!("<shape type=\"rectangle\"><transform name=\"to_world\">\n{inside}</transform></shape>")
+    format!("<shape type='rectangle'><transform name='to_world'>\n{inside}</transform></shape>")
 }
 
 #[test]
@@ -86,33 +96,32 @@ fn missing_and_broken_files_are_named() {
             "pointer.png: this is a Git LFS pointer, not the file itself: run `git lfs pull`",
         ),
         (mesh("obj", "page.obj"), "page.obj: this is a web page (HTML), not the file itself"),
-        ("<shape type=\"obj\"/>".to_owned(), "line 2: <shape type=\"obj\"> needs a `filename`"),
-        (format!("<include filename=\"b.xml\"/>{RECTANGLE}"), "line 2 cannot be read"),
+        ("<shape type='obj'/>".to_owned(), "line 2: <shape type=\"obj\"> needs a `filename`"),
+        (format!("<include filename='b.xml'/>{RECTANGLE}"), "line 2 cannot be read"),
     ]);
 }
 
 #[test]
 fn unsupported_kinds_are_named() {
     all_fail(&[
-        ("\n<shape type=\"hair\"/>".to_owned(), "line 3: <shape type=\"hair\"> is not supported"),
+        ("\n<shape type='hair'/>".to_owned(), "line 3: <shape type=\"hair\"> is not supported"),
         (
-            bsdf("<bsdf type=\"hair\"/>"),
+            bsdf("<bsdf type='hair'/>"),
             "line 3: <bsdf type=\"hair\"> (`--source mitsuba` has it) is not supported",
         ),
-        (bsdf("<bsdf type=\"twosided\"/>"), "line 3: <bsdf type=\"twosided\"> needs a <bsdf> in it"),
+        (bsdf("<bsdf type='twosided'/>"), "line 3: <bsdf type=\"twosided\"> needs a <bsdf> in it"),
         (
-            bsdf("<bsdf type=\"mask\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf>"),
+            of("mask", "<bsdf type='diffuse'/><bsdf type='diffuse'/>"),
             "with more than one <bsdf> in it is not supported",
         ),
         (
-            bsdf("<bsdf type=\"mask\"><bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf></bsdf>"),
-            "line 3: \
-            a mask in a mask is not supported",
+            of("mask", "<bsdf type='mask'><bsdf type='diffuse'/></bsdf>"),
+            "line 3: a mask in a mask is not supported",
         ),
-        (bsdf("<bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/>"), "line 3: a shape has at most one bsdf"),
-        (bsdf("<emitter type=\"area\"/><emitter type=\"area\"/>"), "line 3: a shape has at most one emitter"),
-        (bsdf("<emitter type=\"ies\"/>"), "line 3: <emitter type=\"ies\"> in a shape is not supported"),
-        ("<emitter type=\"ies\"/>".to_owned(), "line 2: <emitter type=\"ies\"> is not supported"),
+        (bsdf("<bsdf type='diffuse'/><bsdf type='diffuse'/>"), "line 3: a shape has at most one bsdf"),
+        (bsdf("<emitter type='area'/><emitter type='area'/>"), "line 3: a shape has at most one emitter"),
+        (bsdf("<emitter type='ies'/>"), "line 3: <emitter type=\"ies\"> in a shape is not supported"),
+        ("<emitter type='ies'/>".to_owned(), "line 2: <emitter type=\"ies\"> is not supported"),
     ]);
 }
 
@@ -120,117 +129,67 @@ fn unsupported_kinds_are_named() {
 #[test]
 fn bad_values_are_named() {
     all_fail(&[
+        (diffuse("<rgb name='reflectance' value='1 2'/>"), "line 3: 2 numbers; a colour has 1 or 3"),
+        (diffuse("<rgb name='reflectance' value='-1'/>"), "is negative or too large"),
+        (diffuse("<rgb name='reflectance' value='inf'/>"), "line 3: `inf` is not a finite number"),
+        (diffuse("<rgb name='reflectance'/>"), "line 3: `reflectance` has no value"),
         (
-            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"1 2\"/></bsdf>"),
-            "line 3: 2 \
-            numbers; a colour has 1 or 3",
+            diffuse("<string name='reflectance' value='red'/>"),
+            "line 3: `reflectance` is a <string>; expected <rgb>, <srgb>",
         ),
         (
-            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"-1\"/></bsdf>"),
-            "is negative or \
-            too large",
+            diffuse("<srgb name='reflectance' value='#12345'/>"),
+            "line 3: `#12345` is not a colour like #80ff00",
+        ),
+        (diffuse("<srgb name='reflectance' value='#12345é'/>"), "is not a colour like #80ff00"),
+        (
+            diffuse("<srgb name='reflectance' value='#12345g'/>"),
+            "line 3: `#12345g` is not a colour like #80ff00",
         ),
         (
-            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"inf\"/></bsdf>"),
-            "line 3: `inf` \
-            is not a finite number",
-        ),
-        (
-            bsdf("<bsdf type=\"diffuse\"><rgb name=\"reflectance\"/></bsdf>"),
-            "line 3: `reflectance` has no \
-            value",
-        ),
-        (
-            bsdf("<bsdf type=\"diffuse\"><string name=\"reflectance\" value=\"red\"/></bsdf>"),
-            "line 3: \
-            `reflectance` is a <string>; expected <rgb>, <srgb>",
-        ),
-        (
-            bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345\"/></bsdf>"),
-            "line 3: \
-            `#12345` is not a colour like #80ff00",
-        ),
-        (
-            bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345é\"/></bsdf>"),
-            "is not a \
-            colour like #80ff00",
-        ),
-        (
-            bsdf("<bsdf type=\"diffuse\"><srgb name=\"reflectance\" value=\"#12345g\"/></bsdf>"),
-            "line 3: \
-            `#12345g` is not a colour like #80ff00",
-        ),
-        (
-            bsdf("<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"500:0.1, 400:0.2\"/></bsdf>"),
+            diffuse("<spectrum name='reflectance' value='500:0.1, 400:0.2'/>"),
             "line 3: the wavelengths of a spectrum must rise",
         ),
         (
-            bsdf("<bsdf type=\"diffuse\"><texture type=\"wood\" name=\"reflectance\"/></bsdf>"),
-            "line 3: \
-            <texture type=\"wood\" name=\"reflectance\"> is not supported",
+            diffuse("<texture type='wood' name='reflectance'/>"),
+            "line 3: <texture type=\"wood\" name=\"reflectance\"> is not supported",
         ),
         (
-            bsdf(
-                "<bsdf type=\"plastic\"><float name=\"int_ior\" value=\"1\"/>\
-            <float name=\"ext_ior\" value=\"2\"/>\
-            </bsdf>",
-            ),
+            of("plastic", "<float name='int_ior' value='1'/><float name='ext_ior' value='2'/>"),
             "line 2: an index of refraction is 0.5, outside 1…4",
         ),
+        (of("dielectric", "<float name='int_ior' value='0'/>"), "line 3: `int_ior` must be above 0"),
         (
-            bsdf("<bsdf type=\"dielectric\"><float name=\"int_ior\" value=\"0\"/></bsdf>"),
-            "line 3: \
-            `int_ior` must be above 0",
+            of("dielectric", "<string name='int_ior' value='jelly'/>"),
+            "line 3: the material `jelly` (known: vacuum, helium",
         ),
-        (
-            bsdf("<bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"jelly\"/></bsdf>"),
-            "line 3: \
-            the material `jelly` (known: vacuum, helium",
-        ),
-        (
-            bsdf("<bsdf type=\"conductor\"><rgb name=\"eta\" value=\"1\"/></bsdf>"),
-            "line 3: give both \
-            `eta` and `k`, or `material`",
-        ),
-        (light("<string name=\"radiance\" value=\"1\"/>"), "line 3: `radiance` is a <string>"),
-        (light("<rgb name=\"radiance\" value=\"1e13\"/>"), "scene.xml: line 2: "),
+        (of("conductor", "<rgb name='eta' value='1'/>"), "line 3: give both `eta` and `k`, or `material`"),
+        (light("<string name='radiance' value='1'/>"), "line 3: `radiance` is a <string>"),
+        (light("<rgb name='radiance' value='1e13'/>"), "scene.xml: line 2: "),
         (
             light(
-                "<ref name=\"radiance\" id=\"x\"/></emitter></shape><bsdf type=\"diffuse\" id=\"x\"/>\
-            <shape type=\"cube\"><emitter type=\"area\">",
+                "<ref name='radiance' id='x'/></emitter></shape><bsdf type='diffuse' id='x'/>\
+            <shape type='cube'><emitter type='area'>",
             ),
             "expected a texture",
         ),
         (
-            "<shape type=\"rectangle\"><boolean name=\"flip_normals\" value=\"maybe\"/></shape>".to_owned(),
+            shape("rectangle", "<boolean name='flip_normals' value='maybe'/>"),
             "line 2: `maybe` is neither true nor false",
         ),
+        (shape("sphere", "<float name='radius' value='one'/>"), "line 2: `one` is not a finite number"),
+        (shape("sphere", "<float name='radius' value='0'/>"), "line 2: the radius of a sphere is 0"),
         (
-            "<shape type=\"sphere\"><float name=\"radius\" value=\"one\"/></shape>".to_owned(),
-            "line 2: \
-            `one` is not a finite number",
+            shape("sphere", "<float name='center' value='0'/>"),
+            "line 2: `center` is a <float>; expected a point or vector",
         ),
         (
-            "<shape type=\"sphere\"><float name=\"radius\" value=\"0\"/></shape>".to_owned(),
-            "line 2: the \
-            radius of a sphere is 0",
+            mesh("serialized", "bad.serialized'/><integer name='shape_index' value='-1"),
+            "line 3: `shape_index` is negative",
         ),
         (
-            "<shape type=\"sphere\"><float name=\"center\" value=\"0\"/></shape>".to_owned(),
-            "line 2: \
-            `center` is a <float>; expected a point or vector",
-        ),
-        (
-            "<shape type=\"serialized\"><string name=\"filename\" value=\"bad.serialized\"/>\
-            <integer name=\"shape_index\" value=\"-1\"/>\
-            </shape>"
-                .to_owned(),
-            "line 2: `shape_index` is negative",
-        ),
-        (
-            "<shape type=\"rectangle\"><float name=\"to_world\" value=\"1\"/></shape>".to_owned(),
-            "line 2: \
-            `to_world` is a <float>; expected a transform",
+            shape("rectangle", "<float name='to_world' value='1'/>"),
+            "line 2: `to_world` is a <float>; expected a transform",
         ),
     ]);
 }
@@ -238,19 +197,18 @@ fn bad_values_are_named() {
 #[test]
 fn bad_transforms_are_named() {
     all_fail(&[
-        (move_by("<twist x=\"1\"/>"), "line 3: <twist> in a transform is not supported"),
-        (move_by("<rotate y=\"1\"/>"), "line 3: a rotation needs an angle"),
-        (move_by("<rotate angle=\"1\"/>"), "line 3: a rotation needs an axis that is not 0"),
-        (move_by("<matrix value=\"1 2 3\"/>"), "line 3: 3 numbers; a matrix has 9 or 16"),
+        (move_by("<twist x='1'/>"), "line 3: <twist> in a transform is not supported"),
+        (move_by("<rotate y='1'/>"), "line 3: a rotation needs an angle"),
+        (move_by("<rotate angle='1'/>"), "line 3: a rotation needs an axis that is not 0"),
+        (move_by("<matrix value='1 2 3'/>"), "line 3: 3 numbers; a matrix has 9 or 16"),
         (
-            move_by("<matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1\"/>"),
-            "line 3: a matrix whose last row \
-            is not 0 0 0 1 is not supported",
+            move_by("<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1'/>"),
+            "line 3: a matrix whose last row is not 0 0 0 1 is not supported",
         ),
-        (move_by("<lookat origin=\"1,2,3\" target=\"1,2,3\"/>"), "line 3: origin and target are the same"),
-        (move_by("<lookat origin=\"1,2,3\"/>"), "line 3: `target` is missing"),
-        (move_by("<translate x=\"1e300\"/><scale value=\"1e300\"/>"), "line 2: the transform is too large"),
-        (move_by("<translate x=\"1e9\"/>"), "line 2: "),
+        (move_by("<lookat origin='1,2,3' target='1,2,3'/>"), "line 3: origin and target are the same"),
+        (move_by("<lookat origin='1,2,3'/>"), "line 3: `target` is missing"),
+        (move_by("<translate x='1e300'/><scale value='1e300'/>"), "line 2: the transform is too large"),
+        (move_by("<translate x='1e9'/>"), "line 2: "),
     ]);
 }
 
@@ -260,7 +218,7 @@ fn links_do_not_lead_out() {
     let elsewhere = Folder::new().with_png("a.png", 1, &[[1, 2, 3, 4]]);
     let folder = Folder::new();
     std::os::unix::fs::symlink(elsewhere.path(), folder.path().join("link")).unwrap();
-    let body = "<emitter type=\"envmap\"><string name=\"filename\" value=\"link/a.png\"/></emitter>";
+    let body = "<emitter type='envmap'><string name='filename' value='link/a.png'/></emitter>";
     assert!(folder.body(body).unwrap_err().contains("`link/a.png` lies outside the folder of the scene"));
 }
 
@@ -270,34 +228,33 @@ fn warnings_say_what_is_left_out() {
     let folder = folder();
     for (body, want) in [
         (
-            "<shape type=\"obj\"><string name=\"filename\" value=\"flat.obj\"/></shape>",
+            "<shape type='obj'><string name='filename' value='flat.obj'/></shape>",
             "line 2: 2 of 3 faces have no area and are left out",
         ),
         (
-            "<shape type=\"ply\"><string name=\"filename\" value=\"empty.ply\"/></shape>",
+            "<shape type='ply'><string name='filename' value='empty.ply'/></shape>",
             "line 2: the mesh has no faces, as its file says",
         ),
         (
-            "<shape type=\"obj\"><string name=\"filename\" value=\"curves.obj\"/></shape>",
+            "<shape type='obj'><string name='filename' value='curves.obj'/></shape>",
             "line 2: line 5: `curv` of `curves.obj` is ignored",
         ),
         (
-            "<shape type=\"cube\">\n<transform name=\"to_world\"><scale value=\"2\" x=\"3\"/></transform></shape>",
+            "<shape type='cube'>\n<transform name='to_world'><scale value='2' x='3'/></transform></shape>",
             "line 3: the attribute `x` of <scale> is ignored",
         ),
         (
-            "<shape type=\"cube\">\n<float name=\"unheard_of\" value=\"1\"/></shape>",
+            "<shape type='cube'>\n<float name='unheard_of' value='1'/></shape>",
             "line 3: <float name=\"unheard_of\"> is ignored",
         ),
-        ("\n<volume type=\"grid\"/>", "line 3: <volume type=\"grid\"> is ignored"),
+        ("\n<volume type='grid'/>", "line 3: <volume type=\"grid\"> is ignored"),
         (
-            "<shape type=\"cube\"><bsdf type=\"roughplastic\"><string name=\"distribution\" value=\"phong\"/>\
-                </bsdf></shape>",
+            "<shape type='cube'><bsdf type='roughplastic'><string name='distribution' value='phong'/></bsdf></shape>",
             "line 2: the distribution `phong` is replaced by `beckmann`",
         ),
         (
-            "<shape type=\"cube\"><bsdf type=\"dielectric\">\
-                <float name=\"specular_reflectance\" value=\"0.5\"/></bsdf></shape>",
+            "<shape type='cube'><bsdf type='dielectric'>\
+                <float name='specular_reflectance' value='0.5'/></bsdf></shape>",
             "line 2: `specular_reflectance` [0.5, 0.5, 0.5] is ignored: it is 1",
         ),
     ] {
@@ -320,18 +277,18 @@ fn what_is_no_scene_is_an_error() {
     let folder = Folder::new();
     for (text, want) in [
         ("", "scene.xml: line 1: the XML is broken"),
-        ("<scene version=\"3.0.0\">\n<a></scene>", "scene.xml: line 2: the XML is broken"),
-        ("<world version=\"3.0.0\"/>", "expected <scene version=\"…\"> of Mitsuba"),
+        ("<scene version='3.0.0'>\n<a></scene>", "scene.xml: line 2: the XML is broken"),
+        ("<world version='3.0.0'/>", "expected <scene version=\"…\"> of Mitsuba"),
         ("<scene/>", "expected <scene version=\"…\"> of Mitsuba"),
-        ("<scene version=\"new\"/>", "expected <scene version=\"…\"> of Mitsuba"),
-        ("<scene version=\"4.0.0\"/>", "version 4.0.0 of Mitsuba's scenes is not supported"),
-        ("<!DOCTYPE x [<!ENTITY a \"b\">]><scene version=\"3.0.0\"/>", "the scene has no <sensor>"),
+        ("<scene version='new'/>", "expected <scene version=\"…\"> of Mitsuba"),
+        ("<scene version='4.0.0'/>", "version 4.0.0 of Mitsuba's scenes is not supported"),
+        ("<!DOCTYPE x [<!ENTITY a 'b'>]><scene version='3.0.0'/>", "the scene has no <sensor>"),
         (
-            "<scene version=\"3.0.0\"/>\n<scene version=\"3.0.0\"/>",
+            "<scene version='3.0.0'/>\n<scene version='3.0.0'/>",
             "line 2: the XML is broken: something follows",
         ),
         (
-            "<scene version=\"3.0.0\">\n<default name=\"a\"/></scene>",
+            "<scene version='3.0.0'>\n<default name='a'/></scene>",
             "line 2: a <default> needs a name and a value",
         ),
     ] {
@@ -353,7 +310,7 @@ fn what_is_no_scene_is_an_error() {
 #[test]
 fn what_is_too_large_is_an_error() {
     let folder = Folder::new();
-    let scene = |inside: &str| format!("<scene version=\"3.0.0\">{CAMERA}{inside}</scene>");
+    let scene = |inside: &str| format!("<scene version='3.0.0'>{CAMERA}{inside}</scene>");
     let deep = scene(&("<a>".repeat(100_000) + &"</a>".repeat(100_000)));
     assert!(folder.load(&deep).unwrap_err().contains("33 levels of elements, more than 32"));
     let attributes: String = (0..200_000).map(|i| format!(" b{i}='1'")).collect();
@@ -391,7 +348,7 @@ fn what_is_too_large_is_an_error() {
         let png = [b"\x89PNG\r\n\x1a\n".to_vec(), chunk(&header), chunk(b"IDAT")].concat();
         let folder = Folder::new().with("a.png", png);
         let error = folder
-            .body("<emitter type=\"envmap\"><string name=\"filename\" value=\"a.png\"/></emitter>")
+            .body("<emitter type='envmap'><string name='filename' value='a.png'/></emitter>")
             .unwrap_err();
         assert!(error.contains(want), "{error}");
     }
@@ -406,28 +363,28 @@ fn what_nests_is_bounded() {
         for i in 0..count {
             let next = if i + 1 == count { last.to_owned() } else { format!("c{}", i + 1) };
             all += &format!(
-                "<texture type=\"checkerboard\" id=\"c{i}\"><ref name=\"color0\" id=\"{next}\"/>\
-                 <ref name=\"color1\" id=\"{next}\"/></texture>\n"
+                "<texture type='checkerboard' id='c{i}'><ref name='color0' id='{next}'/>\
+                 <ref name='color1' id='{next}'/></texture>\n"
             );
         }
-        let leaf =
-            "<texture type=\"bitmap\" id=\"leaf\"><string name=\"filename\" value=\"a.png\"/></texture>";
-        let shape = "<shape type=\"cube\"><bsdf type=\"diffuse\"><ref name=\"reflectance\" id=\"c0\"/></bsdf></shape>";
+        let leaf = "<texture type='bitmap' id='leaf'><string name='filename' value='a.png'/></texture>";
+        let shape =
+            "<shape type='cube'><bsdf type='diffuse'><ref name='reflectance' id='c0'/></bsdf></shape>";
         format!("{all}{leaf}{shape}")
     };
     let mixture = |count: usize, part: &str| {
         let weights = vec!["0.001"; count].join(", ");
         format!(
-            "<bsdf type=\"mixturebsdf\" id=\"{count}\"><string name=\"weights\" value=\"{weights}\"/>{}</bsdf>",
+            "<bsdf type='mixturebsdf' id='{count}'><string name='weights' value='{weights}'/>{}</bsdf>",
             part.repeat(count)
         )
     };
-    let grey = "<bsdf type=\"diffuse\"/>";
-    let worn = |bsdf: &str| format!("<shape type=\"cube\">{bsdf}</shape>");
-    let sky = "<emitter type=\"sky\"/>\n";
+    let grey = "<bsdf type='diffuse'/>";
+    let worn = |bsdf: &str| format!("<shape type='cube'>{bsdf}</shape>");
+    let sky = "<emitter type='sky'/>\n";
     let blends = (0..20).fold(grey.to_owned(), |inside, i| {
-        format!("<bsdf type=\"blendbsdf\" id=\"b{i}\">{inside}<ref id=\"b{}\"/></bsdf>", i - 1)
-            .replace("<ref id=\"b-1\"/>", grey)
+        format!("<bsdf type='blendbsdf' id='b{i}'>{inside}<ref id='b{}'/></bsdf>", i - 1)
+            .replace("<ref id='b-1'/>", grey)
     });
     for (body, want) in [
         (checkers(1, "c0"), "<texture type=\"checkerboard\" id=\"c0\"> refers to itself"),
@@ -435,11 +392,11 @@ fn what_nests_is_bounded() {
         (checkers(40, "leaf"), "17 nested surfaces and textures, more than 16"),
         (worn(&mixture(3500, grey)), "257 surfaces that are mixed, more than 256"),
         (
-            mixture(100, grey) + &worn(&mixture(50, "<ref id=\"100\"/>")),
+            mixture(100, grey) + &worn(&mixture(50, "<ref id='100'/>")),
             "surfaces that are mixed, more than 256",
         ),
         (worn(&blends), "17 nested surfaces and textures, more than 16"),
-        ("<shape type=\"merge\" id=\"m\"><ref id=\"m\"/></shape>".to_owned(), "refers to itself"),
+        ("<shape type='merge' id='m'><ref id='m'/></shape>".to_owned(), "refers to itself"),
         (sky.repeat(50), "a second emitter surrounds the scene; there can be only one (49 times"),
     ] {
         let error = folder.body(&body).unwrap_err();
@@ -454,9 +411,10 @@ fn what_nests_is_bounded() {
 /// What Mitsuba reads and XML does not allow.
 #[test]
 fn xml_is_read_as_mitsuba_reads_it() {
-    let lamp = "<shape type=\"rectangle\"><emitter type=\"area\"><rgb name=\"radiance\" value=\"0.5\"/></emitter></shape>";
-    let text = format!("<scene version=\"3.0.0\">{CAMERA}\n<!-- ---- lamp ---- --->\n{lamp}</scene>");
-    let declared = |encoding: &str| format!("<?xml version=\"1.0\" encoding=\"{encoding}\"?>{text}");
+    let lamp =
+        "<shape type='rectangle'><emitter type='area'><rgb name='radiance' value='0.5'/></emitter></shape>";
+    let text = format!("<scene version='3.0.0'>{CAMERA}\n<!-- ---- lamp ---- --->\n{lamp}</scene>");
+    let declared = |encoding: &str| format!("<?xml version='1.0' encoding='{encoding}'?>{text}");
     let wide = |word: fn(u16) -> [u8; 2], text: &str| -> Vec<u8> {
         "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(word).collect()
     };
@@ -468,9 +426,9 @@ fn xml_is_read_as_mitsuba_reads_it() {
         format!("\n \n{}", declared("utf-8")).into_bytes(),
         format!("\u{feff}{}", declared("utf-8")).into_bytes(),
         format!("<!DOCTYPE scene>{text}").into_bytes(),
-        format!("<!DOCTYPE scene SYSTEM \"a>b\" [\n<!ELEMENT scene ANY>\n]>{text}").into_bytes(),
-        text.replace("\"rectangle\"", "\"rectangle\" type=\"cube\"").into_bytes(),
-        text.replace("<shape", "<shape id=\"salt & pepper\"").into_bytes(),
+        format!("<!DOCTYPE scene SYSTEM 'a>b' [\n<!ELEMENT scene ANY>\n]>{text}").into_bytes(),
+        text.replace("'rectangle'", "'rectangle' type='cube'").into_bytes(),
+        text.replace("<shape", "<shape id='salt & pepper'").into_bytes(),
         format!("{text}\0").into_bytes(),
         latin,
         wide(u16::to_le_bytes, &text),

@@ -2,7 +2,7 @@ use crate::util::{CAMERA, Folder, close, look};
 use noisefloor_scenefile::{LoadError, LoadOptions, Treatment, group_warnings, load_with};
 
 fn scene(inside: &str) -> String {
-    format!("<scene version=\"3.0.0\">{CAMERA}\n{inside}</scene>")
+    format!("<scene version='3.0.0'>{CAMERA}\n{inside}</scene>")
 }
 
 fn lamp(radiance: &str) -> String {
@@ -14,10 +14,10 @@ fn lamp(radiance: &str) -> String {
 #[test]
 fn includes_are_read_in_place_with_their_own_lines() {
     let folder = Folder::new()
-        .with("lamp.xml", format!("<scene version=\"3.0.0\">\n{}</scene>", lamp("$level")))
-        .with("alone.xml", "<bsdf type=\"diffuse\" id=\"grey\"/>")
-        .with("wrong.xml", "<scene version=\"3.0.0\">\n\n<shape type=\"hair\"/></scene>")
-        .with("round.xml", "<scene version=\"3.0.0\"><include filename=\"round.xml\"/></scene>");
+        .with("lamp.xml", format!("<scene version='3.0.0'>\n{}</scene>", lamp("$level")))
+        .with("alone.xml", "<bsdf type='diffuse' id='grey'/>")
+        .with("wrong.xml", "<scene version='3.0.0'>\n\n<shape type='hair'/></scene>")
+        .with("round.xml", "<scene version='3.0.0'><include filename='round.xml'/></scene>");
     let body = r#"<default name="level" value="0.5"/><include filename="lamp.xml"/>
         <include filename="alone.xml"/><shape type="cube"><ref id="grey"/>
         <transform name="to_world"><translate z="-50"/></transform></shape>"#;
@@ -99,7 +99,7 @@ fn volumes_are_refused_unless_they_are_to_be_ignored() {
 fn all_errors_are_said_at_once() {
     let folder = Folder::new();
     let hair = r#"<shape type="hair"/>"#;
-    let body = format!("{hair}\n{hair}\n<emitter type=\"ies\"/>\n{hair}");
+    let body = format!("{hair}\n{hair}\n<emitter type='ies'/>\n{hair}");
     let error = folder.body(&body).unwrap_err();
     let lines: Vec<&str> = error.lines().collect();
     assert_eq!(lines.len(), 2, "{error}");

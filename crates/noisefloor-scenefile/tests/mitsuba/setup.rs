@@ -3,7 +3,7 @@ use noisefloor_ptwne::FovAxis;
 
 fn sensor(version: &str, inside: &str) -> Result<noisefloor_scenefile::Loaded, String> {
     Folder::new()
-        .load(&format!("<scene version=\"{version}\"><sensor type=\"perspective\">{inside}</sensor></scene>"))
+        .load(&format!("<scene version='{version}'><sensor type='perspective'>{inside}</sensor></scene>"))
 }
 
 #[test]
@@ -93,10 +93,8 @@ fn transforms_are_those_of_mitsuba() {
         ),
     ] {
         let name = if version == "3.0.0" { "to_world" } else { "toWorld" };
-        let camera = sensor(version, &format!("<transform name=\"{name}\">{steps}</transform>"))
-            .unwrap()
-            .scene
-            .camera();
+        let camera =
+            sensor(version, &format!("<transform name='{name}'>{steps}</transform>")).unwrap().scene.camera();
         let far = eye.iter().fold(1.0, |far: f32, x: &f32| far.max(x.abs()));
         close(camera.eye, eye, 1e-5, steps);
         close(camera.up, up, 1e-5, steps);
@@ -109,10 +107,10 @@ fn other_cameras_are_read_or_refused() {
     let mirrored = r#"<transform name="to_world"><scale x="-1"/></transform>"#;
     assert!(sensor("3.0.0", mirrored).unwrap().scene.optics().mirrored);
     let folder = Folder::new();
-    let error = folder.load("<scene version=\"3.0.0\">\n<sensor type=\"fisheye\"/></scene>").unwrap_err();
+    let error = folder.load("<scene version='3.0.0'>\n<sensor type='fisheye'/></scene>").unwrap_err();
     assert!(error.ends_with("scene.xml: line 2: <sensor type=\"fisheye\"> is not supported"), "{error}");
-    assert!(folder.load("<scene version=\"3.0.0\"/>").unwrap_err().contains("no <sensor>"));
-    let two = format!("<scene version=\"3.0.0\">{CAMERA}\n{CAMERA}</scene>");
+    assert!(folder.load("<scene version='3.0.0'/>").unwrap_err().contains("no <sensor>"));
+    let two = format!("<scene version='3.0.0'>{CAMERA}\n{CAMERA}</scene>");
     assert!(
         folder.load(&two).unwrap().warnings[0].to_string().ends_with("line 2: only the first sensor is used")
     );
@@ -204,7 +202,7 @@ fn parameters_are_put_in_the_longest_first() {
     let body = r#"<default name="r" value="9"/><default name="red" value="0.25"/><default name="all" value="$red, $red"/>
         <shape type="rectangle"><emitter type="area"><rgb name="radiance" value="$red, $all"/></emitter></shape>"#;
     close(folder.see(body), [0.25; 3], 1e-5, body);
-    let error = folder.body("\n<shape type=\"$what\"/>").unwrap_err();
+    let error = folder.body("\n<shape type='$what'/>").unwrap_err();
     assert!(error.contains("line 3: `$what` has no value"), "{error}");
 }
 

@@ -6,13 +6,13 @@ use noisefloor_ptwne::{Ptwne, RenderOptions};
 use noisefloor_scenefile::{LoadOptions, Loaded};
 
 /// A view of the origin from aside, and lights from there and from all around.
-const VIEW: &str = "LookAt 2 3 4  0 0 0  0 0 1 Camera \"perspective\" \"float fov\" 40\n";
-const LIT: &str = "LightSource \"distant\" \"point3 from\" [1 3 2] \"point3 to\" [0 0 0] \"rgb L\" [3 2 1]\n\
-    LightSource \"infinite\" \"rgb L\" [.3 .4 .5]\n";
-const BALL: &str = "Shape \"sphere\"\n";
+const VIEW: &str = "LookAt 2 3 4  0 0 0  0 0 1 Camera 'perspective' 'float fov' 40\n";
+const LIT: &str = "LightSource 'distant' 'point3 from' [1 3 2] 'point3 to' [0 0 0] 'rgb L' [3 2 1]\n\
+    LightSource 'infinite' 'rgb L' [.3 .4 .5]\n";
+const BALL: &str = "Shape 'sphere'\n";
 /// A square from −1 to 1 whose front is +z, with texture coordinates from 0 to 2.
-const SQUARE: &str = "Shape \"trianglemesh\" \"integer indices\" [0 1 2 0 2 3] \
-    \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] \"point2 uv\" [0 0 2 0 2 2 0 2]\n";
+const SQUARE: &str = "Shape 'trianglemesh' 'integer indices' [0 1 2 0 2 3] \
+    'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0] 'point2 uv' [0 0 2 0 2 2 0 2]\n";
 
 /// What a directive with `{}` shows, before and after it other ones.
 fn sketch(folder: &Folder, text: &str) -> (Vec<Rgb>, Option<(usize, usize)>, Option<u32>) {
@@ -39,73 +39,39 @@ fn check(folder: &Folder, text: &str, default: &str, other: &str) -> Option<Stri
 #[test]
 fn shapes_have_the_defaults_of_pbrt() {
     let (folder, mut wrong) = (Folder::new(), vec![]);
-    for (shape, rows) in [
-        (
-            "Shape \"sphere\" {}",
-            &[
-                ("float radius", "1", ".7"),
-                ("float zmin", "-1", "-.3"),
-                ("float zmax", "1", ".3"),
-                ("float phimax", "360", "200"),
-                ("float alpha", "1", ".5"),
-            ][..],
-        ),
-        (
-            "Shape \"cylinder\" {}",
-            &[
-                ("float radius", "1", ".7"),
-                ("float zmin", "-1", "-.3"),
-                ("float zmax", "1", ".3"),
-                ("float phimax", "360", "200"),
-            ],
-        ),
-        (
-            "Shape \"disk\" {}",
-            &[
-                ("float height", "0", ".3"),
-                ("float radius", "1", ".7"),
-                ("float innerradius", "0", ".3"),
-                ("float phimax", "360", "200"),
-            ],
-        ),
-        (
-            "Shape \"cone\" {}",
-            &[("float radius", "1", ".7"), ("float height", "1", ".3"), ("float phimax", "360", "200")],
-        ),
-        (
-            "Shape \"paraboloid\" {}",
-            &[
-                ("float radius", "1", ".7"),
-                ("float zmin", "0", ".3"),
-                ("float zmax", "1", ".6"),
-                ("float phimax", "360", "200"),
-            ],
-        ),
-        (
-            "Shape \"hyperboloid\" {}",
-            &[
-                ("point p1", "0 0 0", ".5 0 0"),
-                ("point p2", "1 1 1", "1 1 .5"),
-                ("float phimax", "360", "200"),
-            ],
-        ),
-        (
-            "Shape \"loopsubdiv\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 1 -1 1 0] \"integer indices\" [0 1 2 0 2 3] {}",
-            &[("integer levels", "3", "1"), ("integer nlevels", "3", "1")],
-        ),
-        (
-            "Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 1] {}",
-            &[("integer indices", "0 1 2", "0 1 1")],
-        ),
-        (
-            "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0] {}",
-            &[("integer indices", "0 1 2 3", "0 1 2 1")],
-        ),
+    let mesh = "'loopsubdiv' 'point3 P' [-1 -1 0 1 -1 0 1 1 1 -1 1 0] 'integer indices' [0 1 2 0 2 3]";
+    for (shape, parameter, default, other) in [
+        ("'sphere'", "float radius", "1", ".7"),
+        ("'sphere'", "float zmin", "-1", "-.3"),
+        ("'sphere'", "float zmax", "1", ".3"),
+        ("'sphere'", "float phimax", "360", "200"),
+        ("'sphere'", "float alpha", "1", ".5"),
+        ("'cylinder'", "float radius", "1", ".7"),
+        ("'cylinder'", "float zmin", "-1", "-.3"),
+        ("'cylinder'", "float zmax", "1", ".3"),
+        ("'cylinder'", "float phimax", "360", "200"),
+        ("'disk'", "float height", "0", ".3"),
+        ("'disk'", "float radius", "1", ".7"),
+        ("'disk'", "float innerradius", "0", ".3"),
+        ("'disk'", "float phimax", "360", "200"),
+        ("'cone'", "float radius", "1", ".7"),
+        ("'cone'", "float height", "1", ".3"),
+        ("'cone'", "float phimax", "360", "200"),
+        ("'paraboloid'", "float radius", "1", ".7"),
+        ("'paraboloid'", "float zmin", "0", ".3"),
+        ("'paraboloid'", "float zmax", "1", ".6"),
+        ("'paraboloid'", "float phimax", "360", "200"),
+        ("'hyperboloid'", "point p1", "0 0 0", ".5 0 0"),
+        ("'hyperboloid'", "point p2", "1 1 1", "1 1 .5"),
+        ("'hyperboloid'", "float phimax", "360", "200"),
+        (mesh, "integer levels", "3", "1"),
+        (mesh, "integer nlevels", "3", "1"),
+        ("'trianglemesh' 'point3 P' [-1 -1 0 1 -1 0 1 1 1]", "integer indices", "0 1 2", "0 1 1"),
+        ("'bilinearmesh' 'point3 P' [-1 -1 0 1 -1 0 -1 1 0 1 1 0]", "integer indices", "0 1 2 3", "0 1 2 1"),
     ] {
-        for (parameter, default, other) in rows {
-            let [default, other] = [default, other].map(|value| format!("\"{parameter}\" [{value}]"));
-            wrong.extend(check(&folder, &format!("{VIEW}WorldBegin {LIT}{shape}"), &default, &other));
-        }
+        let [default, other] = [default, other].map(|value| format!("'{parameter}' [{value}]"));
+        let text = format!("{VIEW}WorldBegin {LIT}Shape {shape} {{}}");
+        wrong.extend(check(&folder, &text, &default, &other));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
 }
@@ -151,12 +117,12 @@ fn materials_have_the_defaults_of_pbrt() {
         ("dielectric", "float eta", "1.5", "1.2"),
         ("dielectric", "float roughness", "0", ".3"),
         ("thindielectric", "float eta", "1.5", "1.2"),
-        ("conductor", "spectrum eta", "\"metal-Cu-eta\"", "\"metal-Au-eta\""),
-        ("conductor", "spectrum k", "\"metal-Cu-k\"", "\"metal-Au-k\""),
+        ("conductor", "spectrum eta", "'metal-Cu-eta'", "'metal-Au-eta'"),
+        ("conductor", "spectrum k", "'metal-Cu-k'", "'metal-Au-k'"),
         ("conductor", "float roughness", "0", ".3"),
-        ("conductor\" \"float roughness\" .3 \"float vroughness", "bool remaproughness", "true", "false"),
-        ("coatedconductor", "spectrum conductor.eta", "\"metal-Cu-eta\"", "\"metal-Au-eta\""),
-        ("coatedconductor", "spectrum conductor.k", "\"metal-Cu-k\"", "\"metal-Au-k\""),
+        ("conductor' 'float roughness' .3 'float vroughness", "bool remaproughness", "true", "false"),
+        ("coatedconductor", "spectrum conductor.eta", "'metal-Cu-eta'", "'metal-Au-eta'"),
+        ("coatedconductor", "spectrum conductor.k", "'metal-Cu-k'", "'metal-Au-k'"),
         ("coatedconductor", "float conductor.roughness", "0", ".3"),
         ("diffusetransmission", "rgb reflectance", ".25 .25 .25", ".5 .2 .5"),
         ("diffusetransmission", "rgb transmittance", ".25 .25 .25", ".5 .2 .5"),
@@ -170,11 +136,11 @@ fn materials_have_the_defaults_of_pbrt() {
         ("disney", "float eta", "1.5", "1.2"),
         ("disney", "float roughness", ".5", ".3"),
         ("disney", "float anisotropic", "0", ".5"),
-        ("disney\" \"rgb color\" [.5 .2 .5] \"float sheen", "float sheentint", ".5", "0"),
-        ("disney\" \"rgb color\" [.5 .2 .5] \"float metallic", "float speculartint", "0", "1"),
+        ("disney' 'rgb color' [.5 .2 .5] 'float sheen", "float sheentint", ".5", "0"),
+        ("disney' 'rgb color' [.5 .2 .5] 'float metallic", "float speculartint", "0", "1"),
         ("disney", "float sheen", "0", "1"),
         ("disney", "float clearcoat", "0", "1"),
-        ("disney\" \"float clearcoat", "float clearcoatgloss", "1", "0"),
+        ("disney' 'float clearcoat", "float clearcoatgloss", "1", "0"),
         ("disney", "float spectrans", "0", "1"),
     ] {
         // A kind that is followed by a parameter gets a value for it
@@ -185,18 +151,15 @@ fn materials_have_the_defaults_of_pbrt() {
         } else {
             " 1"
         };
-        let text = format!("{VIEW}WorldBegin {LIT}Material \"{material}\"{more} {{}}\n{BALL}");
-        let value = |value: &str| format!("\"{parameter}\" [{value}]");
+        let text = format!("{VIEW}WorldBegin {LIT}Material '{material}'{more} {{}}\n{BALL}");
+        let value = |value: &str| format!("'{parameter}' [{value}]");
         wrong.extend(check(&folder, &text, &value(default), &value(other)));
     }
-    let parts = "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [1 0 0]\n\
-        MakeNamedMaterial \"b\" \"string type\" \"diffuse\"\n";
-    for names in [
-        "\"string materials\" [\"a\" \"b\"]",
-        "\"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"b\"",
-    ] {
-        let text = format!("{VIEW}WorldBegin {LIT}{parts}Material \"mix\" {names} {{}}\n{BALL}");
-        wrong.extend(check(&folder, &text, "\"float amount\" .5", "\"float amount\" .3"));
+    let parts = "MakeNamedMaterial 'a' 'string type' 'diffuse' 'rgb reflectance' [1 0 0]\n\
+        MakeNamedMaterial 'b' 'string type' 'diffuse'\n";
+    for names in ["'string materials' ['a' 'b']", "'string namedmaterial1' 'a' 'string namedmaterial2' 'b'"] {
+        let text = format!("{VIEW}WorldBegin {LIT}{parts}Material 'mix' {names} {{}}\n{BALL}");
+        wrong.extend(check(&folder, &text, "'float amount' .5", "'float amount' .3"));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
 }
@@ -207,7 +170,7 @@ fn textures_have_the_defaults_of_pbrt() {
     let picture = image::RgbImage::from_fn(4, 4, |x, y| image::Rgb([60 * x as u8, 60 * y as u8, 30]));
     let (folder, mut wrong) = (Folder::new(), vec![]);
     picture.save(folder.path().join("a.png")).unwrap();
-    let file = "imagemap\" \"string filename\" \"a.png";
+    let file = "imagemap' 'string filename' 'a.png";
     for (class, parameter, default, other) in [
         ("constant", "value", "1", ".3"),
         ("scale", "tex", "1", ".3"),
@@ -217,7 +180,7 @@ fn textures_have_the_defaults_of_pbrt() {
         ("checkerboard", "tex1", "1", ".3"),
         ("checkerboard", "tex2", "0", ".3"),
         ("checkerboard", "integer dimension", "2", ""),
-        ("checkerboard", "string mapping", "\"uv\"", ""),
+        ("checkerboard", "string mapping", "'uv'", ""),
         ("checkerboard", "float uscale", "1", ".3"),
         ("checkerboard", "float vscale", "1", ".3"),
         ("checkerboard", "float udelta", "0", ".3"),
@@ -231,9 +194,9 @@ fn textures_have_the_defaults_of_pbrt() {
         (file, "float scale", "1", "3"),
         (file, "bool invert", "false", "true"),
         (file, "bool gamma", "true", "false"),
-        (file, "string encoding", "\"sRGB\"", "\"linear\""),
-        (file, "string wrap", "\"repeat\"", "\"clamp\""),
-        (file, "string filter", "\"bilinear\"", "\"point\""),
+        (file, "string encoding", "'sRGB'", "'linear'"),
+        (file, "string wrap", "'repeat'", "'clamp'"),
+        (file, "string filter", "'bilinear'", "'point'"),
         (file, "float uscale", "1", ".3"),
     ] {
         for kind in ["float", "spectrum"] {
@@ -244,19 +207,17 @@ fn textures_have_the_defaults_of_pbrt() {
                 _ => None,
             };
             let value = |value: &str| match own {
-                Some("rgb") => format!("\"rgb {parameter}\" [{value} {value} {value}]"),
-                Some(own) => format!("\"{own} {parameter}\" [{value}]"),
-                None => format!("\"{parameter}\" [{value}]"),
+                Some("rgb") => format!("'rgb {parameter}' [{value} {value} {value}]"),
+                Some(own) => format!("'{own} {parameter}' [{value}]"),
+                None => format!("'{parameter}' [{value}]"),
             };
             let surface = match kind {
-                "float" => {
-                    SQUARE.replace("\"integer indices\"", "\"texture alpha\" \"t\" \"integer indices\"")
-                }
-                _ => format!("Material \"diffuse\" \"texture reflectance\" \"t\"\n{SQUARE}"),
+                "float" => SQUARE.replace("'integer indices'", "'texture alpha' 't' 'integer indices'"),
+                _ => format!("Material 'diffuse' 'texture reflectance' 't'\n{SQUARE}"),
             };
-            let text = format!("{VIEW}WorldBegin {LIT}Texture \"t\" \"{kind}\" \"{class}\" {{}}\n{surface}");
+            let text = format!("{VIEW}WorldBegin {LIT}Texture 't' '{kind}' '{class}' {{}}\n{surface}");
             // Of some no other value is read as pbrt does
-            let other = if other.is_empty() { "\"float udelta\" .3".to_owned() } else { value(other) };
+            let other = if other.is_empty() { "'float udelta' .3".to_owned() } else { value(other) };
             wrong.extend(check(&folder, &text, &value(default), &other));
         }
     }
@@ -267,31 +228,31 @@ fn textures_have_the_defaults_of_pbrt() {
 #[test]
 fn lights_have_the_defaults_of_pbrt() {
     let (folder, mut wrong) = (Folder::new(), vec![]);
-    let above = "\"point3 from\" [0 0 2] \"point3 to\" [0 0 0]";
+    let above = "'point3 from' [0 0 2] 'point3 to' [0 0 0]";
     for (light, parameter, default, other) in [
-        ("LightSource \"point\" \"point3 from\" [0 0 2]", "rgb I", "1 1 1", "1 2 1"),
-        ("LightSource \"point\" \"point3 from\" [0 0 2]", "float scale", "1", "2"),
-        ("LightSource \"point\" \"point3 from\" [0 0 2]", "float power", "-1", "2"),
-        ("Translate 0 0 2 LightSource \"point\"", "point3 from", "0 0 0", "0 1 0"),
-        (&format!("LightSource \"distant\" {above}"), "rgb L", "1 1 1", "1 2 1"),
-        (&format!("LightSource \"distant\" {above}"), "float scale", "1", "2"),
-        (&format!("LightSource \"distant\" {above}"), "float illuminance", "-1", "2"),
-        ("LightSource \"distant\" \"point3 to\" [0 0 -1]", "point3 from", "0 0 0", "0 1 0"),
-        ("Rotate 180 1 0 0 LightSource \"distant\"", "point3 to", "0 0 1", "0 1 1"),
-        (&format!("LightSource \"spot\" {above}"), "rgb I", "1 1 1", "1 2 1"),
-        (&format!("LightSource \"spot\" {above}"), "float scale", "1", "2"),
-        (&format!("LightSource \"spot\" {above}"), "float power", "-1", "2"),
-        (&format!("LightSource \"spot\" {above}"), "float coneangle", "30", "20"),
-        (&format!("LightSource \"spot\" {above}"), "float conedeltaangle", "5", "10"),
-        ("Translate 0 0 2 LightSource \"spot\" \"point3 to\" [0 0 -1]", "point3 from", "0 0 0", "0 1 0"),
-        ("Translate 0 0 2 Rotate 180 1 0 0 LightSource \"spot\"", "point3 to", "0 0 1", "0 1 1"),
-        ("LightSource \"infinite\"", "rgb L", "1 1 1", "1 2 1"),
-        ("LightSource \"infinite\"", "float scale", "1", "2"),
-        ("LightSource \"infinite\"", "float illuminance", "-1", "2"),
-        ("AreaLightSource \"diffuse\"", "rgb L", "1 1 1", "1 2 1"),
-        ("AreaLightSource \"diffuse\"", "float scale", "1", "2"),
-        ("AreaLightSource \"diffuse\"", "float power", "-1", "2"),
-        ("ReverseOrientation AreaLightSource \"diffuse\"", "bool twosided", "false", "true"),
+        ("LightSource 'point' 'point3 from' [0 0 2]", "rgb I", "1 1 1", "1 2 1"),
+        ("LightSource 'point' 'point3 from' [0 0 2]", "float scale", "1", "2"),
+        ("LightSource 'point' 'point3 from' [0 0 2]", "float power", "-1", "2"),
+        ("Translate 0 0 2 LightSource 'point'", "point3 from", "0 0 0", "0 1 0"),
+        (&format!("LightSource 'distant' {above}"), "rgb L", "1 1 1", "1 2 1"),
+        (&format!("LightSource 'distant' {above}"), "float scale", "1", "2"),
+        (&format!("LightSource 'distant' {above}"), "float illuminance", "-1", "2"),
+        ("LightSource 'distant' 'point3 to' [0 0 -1]", "point3 from", "0 0 0", "0 1 0"),
+        ("Rotate 180 1 0 0 LightSource 'distant'", "point3 to", "0 0 1", "0 1 1"),
+        (&format!("LightSource 'spot' {above}"), "rgb I", "1 1 1", "1 2 1"),
+        (&format!("LightSource 'spot' {above}"), "float scale", "1", "2"),
+        (&format!("LightSource 'spot' {above}"), "float power", "-1", "2"),
+        (&format!("LightSource 'spot' {above}"), "float coneangle", "30", "20"),
+        (&format!("LightSource 'spot' {above}"), "float conedeltaangle", "5", "10"),
+        ("Translate 0 0 2 LightSource 'spot' 'point3 to' [0 0 -1]", "point3 from", "0 0 0", "0 1 0"),
+        ("Translate 0 0 2 Rotate 180 1 0 0 LightSource 'spot'", "point3 to", "0 0 1", "0 1 1"),
+        ("LightSource 'infinite'", "rgb L", "1 1 1", "1 2 1"),
+        ("LightSource 'infinite'", "float scale", "1", "2"),
+        ("LightSource 'infinite'", "float illuminance", "-1", "2"),
+        ("AreaLightSource 'diffuse'", "rgb L", "1 1 1", "1 2 1"),
+        ("AreaLightSource 'diffuse'", "float scale", "1", "2"),
+        ("AreaLightSource 'diffuse'", "float power", "-1", "2"),
+        ("ReverseOrientation AreaLightSource 'diffuse'", "bool twosided", "false", "true"),
     ] {
         let text = format!("{VIEW}WorldBegin AttributeBegin {light} {{}}\n{SQUARE}AttributeEnd {SQUARE}");
         // The square beside an area light is not in its way
@@ -306,7 +267,7 @@ fn lights_have_the_defaults_of_pbrt() {
             // Only the square outside is seen
             text.replace(&format!("\n{SQUARE}AttributeEnd"), "\nAttributeEnd")
         };
-        let value = |value: &str| format!("\"{parameter}\" [{value}]");
+        let value = |value: &str| format!("'{parameter}' [{value}]");
         wrong.extend(check(&folder, &text, &value(default), &value(other)));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
@@ -318,30 +279,30 @@ fn cameras_and_films_have_the_defaults_of_pbrt() {
     let (folder, mut wrong) = (Folder::new(), vec![]);
     let look_at = "LookAt 2 3 4  0 0 0  0 0 1";
     for (setup, parameter, default, other) in [
-        ("Camera \"perspective\" {}", "float fov", "90", "40"),
-        ("Camera \"perspective\" {}", "float lensradius", "0", "1"),
-        ("Camera \"perspective\" \"float lensradius\" .1 {}", "float focaldistance", "1e6", "3"),
+        ("Camera 'perspective' {}", "float fov", "90", "40"),
+        ("Camera 'perspective' {}", "float lensradius", "0", "1"),
+        ("Camera 'perspective' 'float lensradius' .1 {}", "float focaldistance", "1e6", "3"),
         (
-            "Film \"rgb\" \"integer yresolution\" 1280 {} Camera \"perspective\"",
+            "Film 'rgb' 'integer yresolution' 1280 {} Camera 'perspective'",
             "float screenwindow",
             "-1 1 -1 1",
             "-2 2 -2 2",
         ),
         (
-            "Film \"rgb\" \"integer yresolution\" 1280 {} Camera \"orthographic\"",
+            "Film 'rgb' 'integer yresolution' 1280 {} Camera 'orthographic'",
             "float screenwindow",
             "-1 1 -1 1",
             "-2 2 -2 2",
         ),
-        ("Film \"rgb\" {} Camera \"perspective\"", "integer xresolution", "1280", "400"),
-        ("Film \"rgb\" {} Camera \"perspective\"", "integer yresolution", "720", "400"),
-        ("Film \"rgb\" {} Camera \"perspective\"", "float iso", "100", "200"),
-        ("Film \"rgb\" {} Camera \"perspective\"", "float exposuretime", "1", "2"),
-        ("Film \"image\" {} Camera \"perspective\"", "float scale", "1", "2"),
-        ("Film \"rgb\" {} Camera \"perspective\"", "float cropwindow", "0 1 0 1", "0 .5 0 .5"),
-        ("Film \"rgb\" {} Camera \"perspective\"", "float maxcomponentvalue", "1e30", ".1"),
-        ("Integrator \"volpath\" {} Camera \"perspective\"", "integer maxdepth", "5", "3"),
-        ("Integrator \"path\" {} Camera \"perspective\"", "integer maxdepth", "5", "3"),
+        ("Film 'rgb' {} Camera 'perspective'", "integer xresolution", "1280", "400"),
+        ("Film 'rgb' {} Camera 'perspective'", "integer yresolution", "720", "400"),
+        ("Film 'rgb' {} Camera 'perspective'", "float iso", "100", "200"),
+        ("Film 'rgb' {} Camera 'perspective'", "float exposuretime", "1", "2"),
+        ("Film 'image' {} Camera 'perspective'", "float scale", "1", "2"),
+        ("Film 'rgb' {} Camera 'perspective'", "float cropwindow", "0 1 0 1", "0 .5 0 .5"),
+        ("Film 'rgb' {} Camera 'perspective'", "float maxcomponentvalue", "1e30", ".1"),
+        ("Integrator 'volpath' {} Camera 'perspective'", "integer maxdepth", "5", "3"),
+        ("Integrator 'path' {} Camera 'perspective'", "integer maxdepth", "5", "3"),
     ] {
         // A window is the camera's
         let setup = if parameter == "float screenwindow" {
@@ -350,7 +311,7 @@ fn cameras_and_films_have_the_defaults_of_pbrt() {
             setup.to_owned()
         };
         let text = format!("{look_at} {setup} WorldBegin {LIT}{BALL}");
-        let value = |value: &str| format!("\"{parameter}\" [{value}]");
+        let value = |value: &str| format!("'{parameter}' [{value}]");
         wrong.extend(check(&folder, &text, &value(default), &value(other)));
     }
     // Without an integrator pbrt has one of five bounces

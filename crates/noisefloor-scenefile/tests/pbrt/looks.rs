@@ -6,15 +6,15 @@ use std::f32::consts::PI;
 
 /// A square from −1 to 1 whose front is +z.
 const SQUARE: &str =
-    "Shape \"trianglemesh\" \"integer indices\" [0 1 2 0 2 3] \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]\n";
-const LIGHT: &str = "AreaLightSource \"diffuse\" \"rgb L\" [1 2 3]\n";
-const SKY: &str = "LightSource \"infinite\" \"rgb L\" [1 1 1]\n";
+    "Shape 'trianglemesh' 'integer indices' [0 1 2 0 2 3] 'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0]\n";
+const LIGHT: &str = "AreaLightSource 'diffuse' 'rgb L' [1 2 3]\n";
+const SKY: &str = "LightSource 'infinite' 'rgb L' [1 1 1]\n";
 
 /// Fronts, as the source of pbrt has them: by corners in the shape's own coordinates, by normals where there
 /// are any.
 #[test]
 fn lights_shine_from_their_front() {
-    let normals = SQUARE.replace("\"point3 P\"", "\"normal N\" [0 0 -1 0 0 -1 0 0 -1 0 0 -1] \"point3 P\"");
+    let normals = SQUARE.replace("'point3 P'", "'normal N' [0 0 -1 0 0 -1 0 0 -1 0 0 -1] 'point3 P'");
     for (before, shape, shines) in [
         ("", SQUARE, true),
         ("Rotate 180 0 1 0\n", SQUARE, false),
@@ -24,10 +24,10 @@ fn lights_shine_from_their_front() {
         ("ReverseOrientation Rotate 180 0 1 0\n", SQUARE, true),
         ("", &normals, false),
         ("ReverseOrientation\n", &normals, true),
-        ("", "Shape \"disk\" \"float radius\" 2\n", true),
-        ("ReverseOrientation\n", "Shape \"disk\"\n", false),
-        ("", "Shape \"sphere\" \"float radius\" 0.5\n", true),
-        ("ReverseOrientation\n", "Shape \"sphere\" \"float radius\" 0.5\n", false),
+        ("", "Shape 'disk' 'float radius' 2\n", true),
+        ("ReverseOrientation\n", "Shape 'disk'\n", false),
+        ("", "Shape 'sphere' 'float radius' 0.5\n", true),
+        ("ReverseOrientation\n", "Shape 'sphere' 'float radius' 0.5\n", false),
     ] {
         let want = if shines { [1.0, 2.0, 3.0] } else { [0.0; 3] };
         close(Folder::new().see(&format!("{before}{LIGHT}{shape}")), want, 1e-4, &format!("{before}{shape}"));
@@ -40,7 +40,7 @@ fn lights_shine_from_their_front() {
 fn pictures_are_not_mirrored() {
     let world = format!("WorldBegin {LIGHT} Translate 1 0 0 {SQUARE}");
     for (scale, lit) in [("", [true, false]), ("Scale -1 1 1 ", [false, true])] {
-        let text = format!("{scale}LookAt 0 0 5 0 0 0 0 1 0 Camera \"perspective\" \"float fov\" 40 {world}");
+        let text = format!("{scale}LookAt 0 0 5 0 0 0 0 1 0 Camera 'perspective' 'float fov' 40 {world}");
         let loaded = Folder::new().load_with(&text, &LoadOptions::default()).unwrap();
         assert_eq!(loaded.scene.optics().fov_axis, FovAxis::Smaller);
         let pixels = look(loaded, 2);
@@ -60,28 +60,27 @@ fn relief_and_subdivision_shape_what_is_lit() {
         folder
     };
     // From +x +z onto the square, whose u runs along +x over 2 units
-    let sun = "LightSource \"distant\" \"rgb L\" [3 3 3] \"point3 from\" [1 0 1] \"point3 to\" [0 0 0]\n";
-    let square = SQUARE.replace("\"point3 P\"", "\"point2 uv\" [0 0 1 0 1 1 0 1] \"point3 P\"");
+    let sun = "LightSource 'distant' 'rgb L' [3 3 3] 'point3 from' [1 0 1] 'point3 to' [0 0 0]\n";
+    let square = SQUARE.replace("'point3 P'", "'point2 uv' [0 0 1 0 1 1 0 1] 'point3 P'");
     let lambert =
         |[x, z]: [f32; 2]| [0.5 / std::f32::consts::PI * 3.0 * (x + z) / (2.0 * (x * x + z * z)).sqrt(); 3];
     // A picture of two pixels rises by 1 between their middles, 1 unit apart; times −0.1·4
     let ramp = exr(&[[0.0; 3], [1.0; 3]]);
-    let texture = "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"a.exr\" \"float scale\" 4\n\
-        Texture \"s\" \"float\" \"scale\" \"texture tex\" \"t\" \"float scale\" -0.1\n";
-    for material in [
-        "Material \"diffuse\" \"texture displacement\" \"s\"\n",
-        "Material \"matte\" \"texture bumpmap\" \"s\"\n",
-    ] {
+    let texture = "Texture 't' 'float' 'imagemap' 'string filename' 'a.exr' 'float scale' 4\n\
+        Texture 's' 'float' 'scale' 'texture tex' 't' 'float scale' -0.1\n";
+    for material in
+        ["Material 'diffuse' 'texture displacement' 's'\n", "Material 'matte' 'texture bumpmap' 's'\n"]
+    {
         let world = format!("{sun}{texture}{material}{square}");
         close(ramp.see(&world), lambert([0.4, 1.0]), 5e-3, material);
     }
     let turned = exr(&[[0.8, 0.5, 0.9]]);
-    let material = "Material \"diffuse\" \"string normalmap\" \"a.exr\"\n";
+    let material = "Material 'diffuse' 'string normalmap' 'a.exr'\n";
     close(turned.see(&format!("{sun}{material}{square}")), lambert([0.6, 0.8]), 5e-3, material);
 
     // A flat square of four: subdivided, its middle stays where it is. Levels beyond memory are refused
-    let grid = "Shape \"loopsubdiv\" \"integer indices\" [0 1 4 0 4 3 1 2 5 1 5 4 3 4 7 3 7 6 4 5 8 4 8 7] \
-        \"point3 P\" [-1 -1 0 0 -1 0 1 -1 0 -1 0 0 0 0 0 1 0 0 -1 1 0 0 1 0 1 1 0] \"integer levels\" ";
+    let grid = "Shape 'loopsubdiv' 'integer indices' [0 1 4 0 4 3 1 2 5 1 5 4 3 4 7 3 7 6 4 5 8 4 8 7] \
+        'point3 P' [-1 -1 0 0 -1 0 1 -1 0 -1 0 0 0 0 0 1 0 0 -1 1 0 0 1 0 1 1 0] 'integer levels' ";
     let loaded = ramp.world(&format!("{sun}{grid}2")).unwrap();
     assert_eq!((loaded.scene.surfaces(), loaded.warnings.len()), (8 * 16, 0));
     close(ramp.see(&format!("{sun}{grid}2")), lambert([0.0, 1.0]), 5e-3, grid);
@@ -95,52 +94,52 @@ fn relief_and_subdivision_shape_what_is_lit() {
 fn materials_of_both_versions_reflect_the_sky() {
     let folder = Folder::new();
     for (material, want, tolerance) in [
-        ("Material \"diffuse\" \"rgb reflectance\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
-        ("Material \"matte\" \"color Kd\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
-        ("MakeNamedMaterial \"m\" \"string type\" \"diffuse\" NamedMaterial \"m\"", [0.5; 3], 1e-3),
-        ("Material \"mirror\" \"rgb Kr\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
+        ("Material 'diffuse' 'rgb reflectance' [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
+        ("Material 'matte' 'color Kd' [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
+        ("MakeNamedMaterial 'm' 'string type' 'diffuse' NamedMaterial 'm'", [0.5; 3], 1e-3),
+        ("Material 'mirror' 'rgb Kr' [0.5 0.25 0]", [0.5, 0.25, 0.0], 1e-3),
         // A single boundary: 4 % of the sky, and 96 % over 1.5². One of 25 samples is reflected
-        ("Material \"dielectric\"", [0.04 + 0.96 / 2.25; 3], 2e-2),
-        ("Material \"glass\"", [0.04 + 0.96 / 2.25; 3], 2e-2),
-        ("Material \"thindielectric\"", [1.0; 3], 1e-3),
-        ("Material \"interface\"", [1.0; 3], 1e-3),
+        ("Material 'dielectric'", [0.04 + 0.96 / 2.25; 3], 2e-2),
+        ("Material 'glass'", [0.04 + 0.96 / 2.25; 3], 2e-2),
+        ("Material 'thindielectric'", [1.0; 3], 1e-3),
+        ("Material 'interface'", [1.0; 3], 1e-3),
         (
-            "Material \"conductor\" \"spectrum eta\" \"metal-Ag-eta\" \"spectrum k\" \"metal-Ag-k\"",
+            "Material 'conductor' 'spectrum eta' 'metal-Ag-eta' 'spectrum k' 'metal-Ag-k'",
             [0.97, 0.96, 0.90],
             0.05,
         ),
-        ("Material \"conductor\" \"rgb reflectance\" [0.5 0.25 0]", [0.5, 0.25, 0.0], 2e-2),
-        ("Material \"plastic\" \"rgb Kd\" [0.5 0.25 0] \"rgb Ks\" [0 0 0]", [0.5, 0.25, 0.0], 1e-3),
+        ("Material 'conductor' 'rgb reflectance' [0.5 0.25 0]", [0.5, 0.25, 0.0], 2e-2),
+        ("Material 'plastic' 'rgb Kd' [0.5 0.25 0] 'rgb Ks' [0 0 0]", [0.5, 0.25, 0.0], 1e-3),
         // Seen along the normal, Oren's and Nayar's A of 20°: 1 − σ²/(2(σ² + 0.33)) = 0.8652
-        ("Material \"matte\" \"rgb Kd\" [0.5 0.25 0] \"float sigma\" 20", [0.4326, 0.2163, 0.0], 2e-2),
+        ("Material 'matte' 'rgb Kd' [0.5 0.25 0] 'float sigma' 20", [0.4326, 0.2163, 0.0], 2e-2),
         // 4 % of a mirror. One of ten samples takes the facets: four standard deviations
         (
-            "Material \"uber\" \"rgb Kd\" [0 0.2 0] \"rgb Ks\" [0.5 0.5 0.5] \"rgb Kr\" [0 0 1] \
-             \"float roughness\" 0.001 \"bool remaproughness\" false",
+            "Material 'uber' 'rgb Kd' [0 0.2 0] 'rgb Ks' [0.5 0.5 0.5] 'rgb Kr' [0 0 1] \
+             'float roughness' 0.001 'bool remaproughness' false",
             [0.02, 0.22, 0.06],
             0.19,
         ),
         (
-            "Material \"uber\" \"rgb Kd\" [0.5 0.25 0] \"rgb Ks\" [0 0 0] \"rgb opacity\" [0.5 0.5 0.5]",
+            "Material 'uber' 'rgb Kd' [0.5 0.25 0] 'rgb Ks' [0 0 0] 'rgb opacity' [0.5 0.5 0.5]",
             [0.75, 0.625, 0.5],
             6e-2,
         ),
         (
-            "Material \"translucent\" \"rgb Kd\" [1 0.5 0] \"rgb Ks\" [0 0 0] \"rgb reflect\" [0.5 0.5 0.5] \
-             \"rgb transmit\" [0.25 0.25 0.25]",
+            "Material 'translucent' 'rgb Kd' [1 0.5 0] 'rgb Ks' [0 0 0] 'rgb reflect' [0.5 0.5 0.5] \
+             'rgb transmit' [0.25 0.25 0.25]",
             [0.75, 0.375, 0.0],
             1e-3,
         ),
         (
-            "Material \"diffusetransmission\" \"rgb reflectance\" [0.2 0 0] \"rgb transmittance\" [0 0.8 0] \
-             \"float scale\" 0.5",
+            "Material 'diffusetransmission' 'rgb reflectance' [0.2 0 0] 'rgb transmittance' [0 0.8 0] \
+             'float scale' 0.5",
             [0.1, 0.4, 0.0],
             5e-2,
         ),
         (
-            "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [1 1 1] \
-             MakeNamedMaterial \"b\" \"string type\" \"diffuse\" \"rgb reflectance\" [0 0 0] \
-             Material \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25",
+            "MakeNamedMaterial 'a' 'string type' 'diffuse' 'rgb reflectance' [1 1 1] \
+             MakeNamedMaterial 'b' 'string type' 'diffuse' 'rgb reflectance' [0 0 0] \
+             Material 'mix' 'string materials' ['a' 'b'] 'float amount' 0.25",
             [0.75; 3],
             0.06,
         ),
@@ -153,12 +152,12 @@ fn materials_of_both_versions_reflect_the_sky() {
 /// that, which is an α of 0.047, except for glass.
 #[test]
 fn only_glass_is_smooth_in_version_3() {
-    let sun = "LightSource \"distant\" \"rgb L\" [1 1 1] \"point3 from\" [0.05 0 1] \"point3 to\" [0 0 0]\n";
+    let sun = "LightSource 'distant' 'rgb L' [1 1 1] 'point3 from' [0.05 0 1] 'point3 to' [0 0 0]\n";
     for (material, shines) in [
-        ("\"metal\" \"float roughness\" 0", true),
-        ("\"plastic\" \"rgb Kd\" [0 0 0] \"float roughness\" 0", true),
-        ("\"metal\" \"float roughness\" 0 \"bool remaproughness\" false", false),
-        ("\"glass\" \"float uroughness\" 0 \"float vroughness\" 0", false),
+        ("'metal' 'float roughness' 0", true),
+        ("'plastic' 'rgb Kd' [0 0 0] 'float roughness' 0", true),
+        ("'metal' 'float roughness' 0 'bool remaproughness' false", false),
+        ("'glass' 'float uroughness' 0 'float vroughness' 0", false),
     ] {
         let seen = Folder::new().see(&format!("{sun}Material {material}\n{SQUARE}"))[1];
         assert_eq!(seen > 0.01, shines, "{material}: {seen}");
@@ -169,7 +168,7 @@ fn only_glass_is_smooth_in_version_3() {
 #[test]
 fn coloured_opacity_is_warned_of() {
     for (colour, warnings) in [("0.5 0.5 0.5", 0), ("0.9 0.5 0.1", 1)] {
-        let world = format!("Material \"uber\" \"rgb opacity\" [{colour}]\n{SQUARE}{SKY}");
+        let world = format!("Material 'uber' 'rgb opacity' [{colour}]\n{SQUARE}{SKY}");
         let loaded = Folder::new().world(&world).unwrap();
         assert_eq!(loaded.warnings.len(), warnings, "{:?}", loaded.warnings);
     }
@@ -178,32 +177,26 @@ fn coloured_opacity_is_warned_of() {
 #[test]
 fn lights_have_the_units_of_pbrt() {
     let folder = Folder::new();
-    let floor = format!("Material \"diffuse\" \"rgb reflectance\" [0.8 0.8 0.8] Scale 100 100 1 {SQUARE}");
+    let floor = format!("Material 'diffuse' 'rgb reflectance' [0.8 0.8 0.8] Scale 100 100 1 {SQUARE}");
     let per_irradiance = 0.8 / std::f32::consts::PI;
     for (light, irradiance) in [
-        ("LightSource \"point\" \"rgb I\" [4 8 0] \"point3 from\" [0 0 2]", [1.0, 2.0, 0.0]),
-        ("LightSource \"point\" \"rgb I\" [1 1 1] \"float scale\" 4 \"point3 from\" [0 0 2]", [1.0; 3]),
-        (
-            "LightSource \"distant\" \"rgb L\" [5 0 0] \"point3 from\" [0 -3 4] \"point3 to\" [0 0 0]",
-            [4.0, 0.0, 0.0],
-        ),
-        ("LightSource \"spot\" \"rgb I\" [4 4 4] \"point3 from\" [0 0 2] \"point3 to\" [0 0 0]", [1.0; 3]),
+        ("LightSource 'point' 'rgb I' [4 8 0] 'point3 from' [0 0 2]", [1.0, 2.0, 0.0]),
+        ("LightSource 'point' 'rgb I' [1 1 1] 'float scale' 4 'point3 from' [0 0 2]", [1.0; 3]),
+        ("LightSource 'distant' 'rgb L' [5 0 0] 'point3 from' [0 -3 4] 'point3 to' [0 0 0]", [4.0, 0.0, 0.0]),
+        ("LightSource 'spot' 'rgb I' [4 4 4] 'point3 from' [0 0 2] 'point3 to' [0 0 0]", [1.0; 3]),
         // Halfway between 25° and 30° by the cosine, 27.6046°
-        (
-            "LightSource \"spot\" \"rgb I\" [4 4 4] \"point3 from\" [0 0 2] \"point3 to\" [1.045778 0 0]",
-            [0.5; 3],
-        ),
+        ("LightSource 'spot' 'rgb I' [4 4 4] 'point3 from' [0 0 2] 'point3 to' [1.045778 0 0]", [0.5; 3]),
     ] {
         let want = irradiance.map(|e| e * per_irradiance);
         close(folder.see(&format!("{light}\n{floor}")), want, 1e-3, light);
     }
     // A black body has a luminance of 1 in pbrt 4
-    let lamp = format!("AreaLightSource \"diffuse\" \"blackbody L\" 3000 \"float scale\" 2 {SQUARE}");
+    let lamp = format!("AreaLightSource 'diffuse' 'blackbody L' 3000 'float scale' 2 {SQUARE}");
     let [r, g, b] = folder.see(&lamp);
     assert!((0.2126 * r + 0.7152 * g + 0.0722 * b - 2.0).abs() < 1e-3 && r > g && g > b, "{r} {g} {b}");
     // The film's exposure counts for all
     let text = format!(
-        "{CAMERA}Film \"rgb\" \"float iso\" 200 \"integer xresolution\" 4 \"integer yresolution\" 3 WorldBegin {LIGHT}{SQUARE}"
+        "{CAMERA}Film 'rgb' 'float iso' 200 'integer xresolution' 4 'integer yresolution' 3 WorldBegin {LIGHT}{SQUARE}"
     );
     let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
     assert_eq!(loaded.size, Some((4, 3)));
@@ -213,10 +206,10 @@ fn lights_have_the_units_of_pbrt() {
 #[test]
 fn objects_are_where_their_instances_are() {
     let folder = Folder::new();
-    let object = format!("ObjectBegin \"o\" {LIGHT}{SQUARE} ObjectEnd\n");
+    let object = format!("ObjectBegin 'o' {LIGHT}{SQUARE} ObjectEnd\n");
     close(folder.see(&object), [0.0; 3], 1e-4, "object alone");
-    close(folder.see(&format!("{object}ObjectInstance \"o\"")), [1.0, 2.0, 3.0], 1e-4, "instance");
-    let aside = format!("{object}AttributeBegin Translate 5 0 0 ObjectInstance \"o\" AttributeEnd");
+    close(folder.see(&format!("{object}ObjectInstance 'o'")), [1.0, 2.0, 3.0], 1e-4, "instance");
+    let aside = format!("{object}AttributeBegin Translate 5 0 0 ObjectInstance 'o' AttributeEnd");
     close(folder.see(&aside), [0.0; 3], 1e-4, "aside");
 }
 
@@ -224,25 +217,25 @@ fn objects_are_where_their_instances_are() {
 #[test]
 fn instances_share_their_object() {
     let folder = Folder::new();
-    let object = "ObjectBegin \"o\" Shape \"sphere\" Shape \"cylinder\" AttributeBegin Translate 0 3 0 \
-        AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] Shape \"sphere\" AttributeEnd ObjectEnd\n";
+    let object = "ObjectBegin 'o' Shape 'sphere' Shape 'cylinder' AttributeBegin Translate 0 3 0 \
+        AreaLightSource 'diffuse' 'rgb L' [1 2 3] Shape 'sphere' AttributeEnd ObjectEnd\n";
     // An object that is never shown is not in the scene
     assert_eq!(folder.world(object).unwrap().scene.surfaces(), 0);
-    let scene = folder.world(&format!("{object}{}", "ObjectInstance \"o\"\n".repeat(4000))).unwrap().scene;
+    let scene = folder.world(&format!("{object}{}", "ObjectInstance 'o'\n".repeat(4000))).unwrap().scene;
     assert_eq!((scene.surfaces(), scene.instances(), scene.lights()), (1 + 256 + 4000, 4000, 4000));
     // Bytes: the object's 257 surfaces, and a lamp and a matrix for each instance
     assert!(scene.geometry_bytes() < 257 * 150 + 4000 * 1000, "{}", scene.geometry_bytes());
 
     // The lamp shines where the instance is, stretched or not; only then it is triangles
-    let seen = |scale: &str| format!("{object}Scale {scale} Translate 0 -3 0 ObjectInstance \"o\"");
+    let seen = |scale: &str| format!("{object}Scale {scale} Translate 0 -3 0 ObjectInstance 'o'");
     close(folder.see(&seen("1 1 1")), [1.0, 2.0, 3.0], 1e-4, "round");
     close(folder.see(&seen("0.5 1 2")), [1.0, 2.0, 3.0], 1e-4, "stretched");
-    let many = format!("{object}Scale 1 1 2{}", " ObjectInstance \"o\"".repeat(600));
+    let many = format!("{object}Scale 1 1 2{}", " ObjectInstance 'o'".repeat(600));
     let error = folder.world(&many).unwrap_err();
     assert!(error.contains("surfaces so far, more than 2"), "{error}");
 
     let flat =
-        format!("{object}AttributeBegin Scale 1 0 1 ObjectInstance \"o\" AttributeEnd ObjectInstance \"o\"");
+        format!("{object}AttributeBegin Scale 1 0 1 ObjectInstance 'o' AttributeEnd ObjectInstance 'o'");
     let loaded = folder.world(&flat).unwrap();
     assert_eq!(loaded.scene.instances(), 1);
     assert!(loaded.warnings.iter().any(|w| w.what == "an instance is left out: its transform is singular"));
@@ -258,10 +251,10 @@ fn other_files_are_read() {
     gz.write_all(ply.as_bytes()).unwrap();
     let folder = Folder::new()
         .with("a.ply.gz", gz.finish().unwrap())
-        .with("lamp.pbrt", format!("{LIGHT}Shape \"plymesh\" \"string filename\" \"a.ply.gz\""))
-        .with("round.pbrt", "Include \"round.pbrt\"");
-    close(folder.see("Include \"lamp.pbrt\""), [1.0, 2.0, 3.0], 1e-4, "include");
-    let round = folder.world("Include \"round.pbrt\"").unwrap_err();
+        .with("lamp.pbrt", format!("{LIGHT}Shape 'plymesh' 'string filename' 'a.ply.gz'"))
+        .with("round.pbrt", "Include 'round.pbrt'");
+    close(folder.see("Include 'lamp.pbrt'"), [1.0, 2.0, 3.0], 1e-4, "include");
+    let round = folder.world("Include 'round.pbrt'").unwrap_err();
     assert!(round.contains("65 levels of included files, more than 64"), "{round}");
 }
 
@@ -273,7 +266,7 @@ fn maps_lie_as_in_pbrt() {
     let layers = noisefloor_image::RenderLayers::rgb(8, 4, &columns);
     let folder = Folder::new();
     noisefloor_image::write_exr(folder.path().join("sky.exr"), &layers).unwrap();
-    let sky = |more: &str| format!("{more} LightSource \"infinite\" \"string filename\" \"sky.exr\"");
+    let sky = |more: &str| format!("{more} LightSource 'infinite' 'string filename' 'sky.exr'");
     // The camera looks along −z: the bottom row
     let down = folder.see(&sky(""));
     assert!((down[1] - 3.0).abs() < 0.3, "{down:?}");
@@ -291,9 +284,9 @@ fn windows_are_parts_of_the_picture() {
     let folder = Folder::new();
     let picture = |film: &str| {
         let text = format!(
-            "LookAt 0 0 5 0 0 0 0 1 0 Camera \"perspective\" \"float fov\" 40
-            Film \"image\" \"integer xresolution\" 40 \"integer yresolution\" 30 {film} WorldBegin
-            AreaLightSource \"diffuse\" Translate -0.9 0.5 0 Shape \"sphere\" \"float radius\" 0.4"
+            "LookAt 0 0 5 0 0 0 0 1 0 Camera 'perspective' 'float fov' 40
+            Film 'image' 'integer xresolution' 40 'integer yresolution' 30 {film} WorldBegin
+            AreaLightSource 'diffuse' Translate -0.9 0.5 0 Shape 'sphere' 'float radius' 0.4"
         );
         let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
         (loaded.size.unwrap(), loaded.scene)
@@ -307,7 +300,7 @@ fn windows_are_parts_of_the_picture() {
     };
     let (_, _, whole) = lit("");
     assert!(whole.iter().any(|p| *p > 0.9));
-    for film in ["\"float cropwindow\" [0.5 0.9 0.1 0.6]", "\"integer pixelbounds\" [20 36 3 18]"] {
+    for film in ["'float cropwindow' [0.5 0.9 0.1 0.6]", "'integer pixelbounds' [20 36 3 18]"] {
         let (width, height, part) = lit(film);
         assert_eq!((width, height), (16, 15), "{film}");
         for (i, p) in part.iter().enumerate() {
@@ -322,8 +315,8 @@ fn windows_are_parts_of_the_picture() {
 #[test]
 fn lamps_of_nothing_shine() {
     let folder = Folder::new();
-    let lamp = "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [0.5 0.25 0] Material \"interface\"
-        Shape \"disk\" \"float radius\" 1 AttributeEnd LightSource \"infinite\" \"rgb L\" [1 1 1]";
+    let lamp = "AttributeBegin AreaLightSource 'diffuse' 'rgb L' [0.5 0.25 0] Material 'interface'
+        Shape 'disk' 'float radius' 1 AttributeEnd LightSource 'infinite' 'rgb L' [1 1 1]";
     close(folder.see(lamp), [1.5, 1.25, 1.0], 1e-4, lamp);
 }
 
@@ -334,27 +327,24 @@ fn roughness_may_be_a_picture() {
     let folder = Folder::new();
     let image = image::RgbImage::from_fn(2, 1, |x, _| image::Rgb([if x == 0 { 26 } else { 204 }; 3]));
     image.save(folder.path().join("r.png")).unwrap();
-    let map = "Texture \"r\" \"float\" \"imagemap\" \"string filename\" \"r.png\" \"string filter\" \"point\"
-        \"string encoding\" \"linear\"";
-    let quad = "Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
-        \"point2 uv\" [0 0 1 0 1 1 0 1] \"integer indices\" [0 1 2 0 2 3]";
-    let sun = "LightSource \"distant\" \"point3 from\" [0 0.4 1] \"point3 to\" [0 0 0] \"rgb L\" [1 1 1]";
+    let map = "Texture 'r' 'float' 'imagemap' 'string filename' 'r.png' 'string filter' 'point'
+        'string encoding' 'linear'";
+    let quad = "Shape 'trianglemesh' 'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
+        'point2 uv' [0 0 1 0 1 1 0 1] 'integer indices' [0 1 2 0 2 3]";
+    let sun = "LightSource 'distant' 'point3 from' [0 0.4 1] 'point3 to' [0 0 0] 'rgb L' [1 1 1]";
     for kind in [
-        "\"conductor\" \"rgb reflectance\" [1 1 1] \"bool remaproughness\" false",
-        "\"disney\" \"rgb color\" [1 1 1] \"float metallic\" 1",
+        "'conductor' 'rgb reflectance' [1 1 1] 'bool remaproughness' false",
+        "'disney' 'rgb color' [1 1 1] 'float metallic' 1",
     ] {
         let at = |x: f32, roughness: &str| {
             folder.see(&format!("{map}\n{sun}\nTranslate {x} 0 0 Material {kind} {roughness} {quad}"))[0]
         };
         for (x, value) in [(0.5, 26.0 / 255.0), (-0.5, 204.0 / 255.0)] {
-            let plain = at(x, &format!("\"float roughness\" {value}"));
-            let mapped = at(x, "\"texture roughness\" \"r\"");
+            let plain = at(x, &format!("'float roughness' {value}"));
+            let mapped = at(x, "'texture roughness' 'r'");
             assert!((mapped / plain - 1.0).abs() < 1e-4, "{kind} {x}: {mapped} {plain}");
         }
-        assert!(
-            (at(0.5, "\"texture roughness\" \"r\"") / at(-0.5, "\"texture roughness\" \"r\"") - 1.0).abs()
-                > 0.5
-        );
+        assert!((at(0.5, "'texture roughness' 'r'") / at(-0.5, "'texture roughness' 'r'") - 1.0).abs() > 0.5);
     }
 }
 
@@ -368,9 +358,9 @@ fn triangles_without_coordinates_are_mapped_by_their_corners() {
     image.save(folder.path().join("a.png")).unwrap();
     let seen = |x: f32, y: f32| {
         folder.see(&format!(
-            "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\" \"string filter\" \"point\"
-            {SKY} Material \"matte\" \"texture Kd\" \"a\" Translate {} {} 0
-            Shape \"trianglemesh\" \"point3 P\" [0 0 0 4 0 0 0 4 0] \"integer indices\" [0 1 2]",
+            "Texture 'a' 'spectrum' 'imagemap' 'string filename' 'a.png' 'string filter' 'point'
+            {SKY} Material 'matte' 'texture Kd' 'a' Translate {} {} 0
+            Shape 'trianglemesh' 'point3 P' [0 0 0 4 0 0 0 4 0] 'integer indices' [0 1 2]",
             -x, -y
         ))[0]
     };
@@ -388,35 +378,35 @@ fn triangles_without_coordinates_are_mapped_by_their_corners() {
 fn spectra_of_lights_are_those_of_their_version() {
     let folder = Folder::new().with("flat.spd", "# nm, value\r300 2\r800 2\r");
     let equal = [1.2048f32, 0.9483, 0.9089];
-    let flat = "\"spectrum L\" [300 2 800 2]";
+    let flat = "'spectrum L' [300 2 800 2]";
     let third = equal.map(|c| 2.0 * c);
     for (light, want) in [
         (flat, third),
-        ("\"spectrum L\" \"flat.spd\"", third),
-        ("\"xyz L\" [2 2 2]", third),
+        ("'spectrum L' 'flat.spd'", third),
+        ("'xyz L' [2 2 2]", third),
         // Its ends stand for all beyond, in any order
-        ("\"spectrum L\" [600 2 500 2]", third),
-        (&format!("{flat} \"rgb scale\" [0.5 1 2]"), [0.5 * third[0], third[1], 2.0 * third[2]]),
-        ("\"rgb L\" [2 2 2]", [2.0; 3]),
+        ("'spectrum L' [600 2 500 2]", third),
+        (&format!("{flat} 'rgb scale' [0.5 1 2]"), [0.5 * third[0], third[1], 2.0 * third[2]]),
+        ("'rgb L' [2 2 2]", [2.0; 3]),
     ] {
-        let sky = format!("LightSource \"infinite\" {light}\n");
+        let sky = format!("LightSource 'infinite' {light}\n");
         close(folder.see(&format!("{sky}WorldEnd")), want, 1e-3, light);
-        let area = format!("AreaLightSource \"diffuse\" {light}\n{SQUARE}WorldEnd");
+        let area = format!("AreaLightSource 'diffuse' {light}\n{SQUARE}WorldEnd");
         close(folder.see(&area), want, 1e-3, light);
-        let distant = format!("LightSource \"distant\" {light} \"point from\" [0 0 1] \"point to\" [0 0 0]");
+        let distant = format!("LightSource 'distant' {light} 'point from' [0 0 1] 'point to' [0 0 0]");
         let reflected = want.map(|c| c * 0.5 / std::f32::consts::PI);
         close(folder.see(&format!("{distant}\n{SQUARE}WorldEnd")), reflected, 2e-3, light);
-        let point = distant.replace("distant", "point").replace("L\"", "I\"");
+        let point = distant.replace("distant", "point").replace("L'", "I'");
         close(folder.see(&format!("{point}\n{SQUARE}WorldEnd")), reflected, 2e-3, light);
     }
     // Version 4 has no WorldEnd, but comments and names may
     let luminance = noisefloor::display::luminance(equal);
-    for text in ["# WorldEnd\n", "Texture \"WorldEnd\" \"float\" \"constant\"\n"] {
-        let sky = format!("{text}LightSource \"infinite\" {flat}");
+    for text in ["# WorldEnd\n", "Texture 'WorldEnd' 'float' 'constant'\n"] {
+        let sky = format!("{text}LightSource 'infinite' {flat}");
         close(folder.see(&sky), equal.map(|c| c / luminance), 1e-3, text);
     }
     // So are factors: seen under a white of 1, and of version 4 under D65
-    let kd = format!("{SKY}Material \"matte\" \"spectrum Kd\" [300 0.5 800 0.5]\n{SQUARE}");
+    let kd = format!("{SKY}Material 'matte' 'spectrum Kd' [300 0.5 800 0.5]\n{SQUARE}");
     close(folder.see(&format!("{kd}WorldEnd")), equal.map(|c| 0.5 * c), 5e-3, "matte");
     let albedo = kd.replace("matte", "diffuse").replace("Kd", "reflectance");
     close(folder.see(&albedo), [0.5; 3], 5e-3, "diffuse");
@@ -444,12 +434,12 @@ fn illuminants_have_their_colours() {
         ("stdillum-F12", [1.7684, 0.8451, 0.2708]),
         ("illum-acesD60", [1.0469, 0.9946, 0.9156]),
     ] {
-        let light = format!("\"spectrum L\" \"{name}\" \"float scale\" 2");
+        let light = format!("'spectrum L' '{name}' 'float scale' 2");
         let want = want.map(|c| 2.0 * c);
-        close(folder.see(&format!("LightSource \"infinite\" {light}")), want, 2e-3, name);
-        close(folder.see(&format!("AreaLightSource \"diffuse\" {light}\n{SQUARE}")), want, 2e-3, name);
+        close(folder.see(&format!("LightSource 'infinite' {light}")), want, 2e-3, name);
+        close(folder.see(&format!("AreaLightSource 'diffuse' {light}\n{SQUARE}")), want, 2e-3, name);
         // pbrt's own table has another D50 than the CIE
-        let said = folder.world(&format!("LightSource \"infinite\" {light}")).unwrap().warnings;
+        let said = folder.world(&format!("LightSource 'infinite' {light}")).unwrap().warnings;
         assert_eq!(said.len(), usize::from(name == "stdillum-D50"), "{said:?}");
     }
     // Names that pbrt does not know, and what cannot be what it is said to be
@@ -461,7 +451,7 @@ fn illuminants_have_their_colours() {
         ("glass-BK7", "`glass-BK7` as a light is not supported"),
         ("nikon_d850_g", "`nikon_d850_g` as a spectrum: it is what a camera's sensor responds to"),
     ] {
-        let error = folder.world(&format!("LightSource \"infinite\" \"spectrum L\" \"{name}\"")).unwrap_err();
+        let error = folder.world(&format!("LightSource 'infinite' 'spectrum L' '{name}'")).unwrap_err();
         assert!(error.contains(want), "{error}");
     }
     for (name, want) in [
@@ -470,7 +460,7 @@ fn illuminants_have_their_colours() {
         ("metal-Hg-eta", "there is no spectrum `metal-Hg-eta`"),
         ("metal-Cu-n", "there is no spectrum `metal-Cu-n`"),
     ] {
-        let world = format!("Material \"diffuse\" \"spectrum reflectance\" \"{name}\" Shape \"sphere\"");
+        let world = format!("Material 'diffuse' 'spectrum reflectance' '{name}' Shape 'sphere'");
         let error = folder.world(&world).unwrap_err();
         assert!(error.contains(want), "{error}");
     }
@@ -491,8 +481,7 @@ fn metals_and_glasses_are_those_that_pbrt_names() {
         ("MgO", [0.0720, 0.0731, 0.0749]),
         ("TiO2", [0.2322, 0.2446, 0.2727]),
     ] {
-        let material =
-            format!("\"conductor\" \"spectrum eta\" \"metal-{name}-eta\" \"spectrum k\" \"metal-{name}-k\"");
+        let material = format!("'conductor' 'spectrum eta' 'metal-{name}-eta' 'spectrum k' 'metal-{name}-k'");
         let seen = folder.see(&format!("{SKY}Material {material}\n{SQUARE}"));
         let off = seen.iter().zip(want).map(|(seen, want)| (seen - want).abs()).fold(0.0, f32::max);
         assert!(off < 0.03, "{name}: {seen:?}, want {want:?}");
@@ -509,7 +498,7 @@ fn metals_and_glasses_are_those_that_pbrt_names() {
         // A boundary reflects F of the sky, and lets through the rest over η²
         let reflected = ((index - 1.0) / (index + 1.0)).powi(2);
         let want = reflected + (1.0 - reflected) / (index * index);
-        let material = format!("Material \"dielectric\" \"spectrum eta\" \"glass-{name}\"");
+        let material = format!("Material 'dielectric' 'spectrum eta' 'glass-{name}'");
         close(folder.see(&format!("{SKY}{material}\n{SQUARE}")), [want; 3], 1e-3, name);
     }
 }
@@ -517,15 +506,15 @@ fn metals_and_glasses_are_those_that_pbrt_names() {
 /// Every sample is scaled down to its largest component.
 #[test]
 fn samples_are_bounded_as_the_film_says() {
-    let film = "Film \"rgb\" \"float maxcomponentvalue\" 2\n";
-    let light = "AreaLightSource \"diffuse\" \"rgb L\" [8 1 1]\n";
+    let film = "Film 'rgb' 'float maxcomponentvalue' 2\n";
+    let light = "AreaLightSource 'diffuse' 'rgb L' [8 1 1]\n";
     let text = |film: &str| format!("{CAMERA}{film}WorldBegin {light}{SQUARE}");
     let load = |film: &str| Folder::new().load_with(&text(film), &LoadOptions::default());
     let loaded = load(film).unwrap();
     assert_eq!((loaded.clamp, loaded.warnings.len()), (Some(2.0), 1));
     close(look(loaded, 1)[0], [2.0, 0.25, 0.25], 1e-4, film);
     close(look(load("").unwrap(), 1)[0], [8.0, 1.0, 1.0], 1e-4, "no film");
-    let error = load("Film \"rgb\" \"float maxcomponentvalue\" 0\n").unwrap_err();
+    let error = load("Film 'rgb' 'float maxcomponentvalue' 0\n").unwrap_err();
     assert!(error.contains("`maxcomponentvalue` must be above 0"), "{error}");
 }
 
@@ -550,12 +539,12 @@ fn files_are_read_in_any_text_or_named() {
             property float z\nend_header\n0 0 0\n",
         );
     for name in ["wide", "latin"] {
-        close(folder.see(&format!("Include \"{name}.pbrt\"")), [1.0, 2.0, 3.0], 1e-4, name);
+        close(folder.see(&format!("Include '{name}.pbrt'")), [1.0, 2.0, 3.0], 1e-4, name);
     }
     for (world, want) in [
-        ("Include \"pointer.pbrt\"", "pointer.pbrt: this is a Git LFS pointer"),
-        ("Shape \"plymesh\" \"string filename\" \"pointer.ply\"", "pointer.ply: this is a Git LFS pointer"),
-        ("Shape \"plymesh\" \"string filename\" \"points.ply\"", "points.ply: the PLY file has no faces"),
+        ("Include 'pointer.pbrt'", "pointer.pbrt: this is a Git LFS pointer"),
+        ("Shape 'plymesh' 'string filename' 'pointer.ply'", "pointer.ply: this is a Git LFS pointer"),
+        ("Shape 'plymesh' 'string filename' 'points.ply'", "points.ply: the PLY file has no faces"),
     ] {
         let error = folder.world(world).unwrap_err();
         assert!(error.contains(want), "{world}: {error}");
@@ -563,7 +552,7 @@ fn files_are_read_in_any_text_or_named() {
 }
 
 /// What [`SQUARE`] is of, with an albedo of ½.
-const GREY: &str = "Material \"diffuse\" \"rgb reflectance\" [.5 .5 .5]\n";
+const GREY: &str = "Material 'diffuse' 'rgb reflectance' [.5 .5 .5]\n";
 
 /// The formulas of pbrt-v4's lights.cpp (k_e and E_v of each `Create`): light of luminance 1 times what is asked for.
 #[test]
@@ -575,43 +564,42 @@ fn lights_have_the_power_that_is_asked_for() {
         * ((1.0 - 25f32.to_radians().cos()) + (25f32.to_radians().cos() - 30f32.to_radians().cos()) / 2.0);
     for (light, want) in [
         (
-            "LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float illuminance\" 2",
+            "LightSource 'distant' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float illuminance' 2",
             diffuse(2.0),
         ),
         (
-            "LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float illuminance\" 2 \"float scale\" 3",
+            "LightSource 'distant' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float illuminance' 2 'float scale' 3",
             diffuse(6.0),
         ),
         (
-            "LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float illuminance\" -1",
+            "LightSource 'distant' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float illuminance' -1",
             diffuse(1.0),
         ),
-        ("LightSource \"point\" \"point3 from\" [0 0 1] \"float power\" 100", diffuse(100.0 / (4.0 * PI))),
+        ("LightSource 'point' 'point3 from' [0 0 1] 'float power' 100", diffuse(100.0 / (4.0 * PI))),
         (
-            "LightSource \"spot\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] \"float power\" 100",
+            "LightSource 'spot' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float power' 100",
             diffuse(100.0 / cone),
         ),
-        ("LightSource \"infinite\" \"float illuminance\" 3", 0.5 / PI * 3.0),
+        ("LightSource 'infinite' 'float illuminance' 3", 0.5 / PI * 3.0),
     ] {
         let got = folder.see(&format!("{light}\n{GREY}{SQUARE}"));
         close(got, [want; 3], 0.02, light);
     }
     // Version 3 knows neither
-    let old = "LightSource \"point\" \"point3 from\" [0 0 1] \"float power\" 100\n";
+    let old = "LightSource 'point' 'point3 from' [0 0 1] 'float power' 100\n";
     close(folder.see(&format!("{old}{GREY}{SQUARE}WorldEnd")), [diffuse(1.0); 3], 0.02, "version 3");
 
     // Shapes that shine: π times area times radiance
-    let patch = "Shape \"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]";
+    let patch = "Shape 'bilinearmesh' 'point3 P' [-1 -1 0 1 -1 0 -1 1 0 1 1 0]";
     for (shape, sides, area) in [
         (SQUARE, 1.0, 4.0),
         (SQUARE, 2.0, 4.0),
         (patch, 1.0, 4.0),
-        ("Scale 2 2 2 Shape \"disk\" \"float radius\" 1", 1.0, 4.0 * PI),
-        ("Shape \"sphere\" \"float radius\" 2", 1.0, 16.0 * PI),
-        ("Scale 2 2 2 Shape \"sphere\"", 1.0, 16.0 * PI),
+        ("Scale 2 2 2 Shape 'disk' 'float radius' 1", 1.0, 4.0 * PI),
+        ("Shape 'sphere' 'float radius' 2", 1.0, 16.0 * PI),
+        ("Scale 2 2 2 Shape 'sphere'", 1.0, 16.0 * PI),
     ] {
-        let light =
-            format!("AreaLightSource \"diffuse\" \"float power\" 10 \"bool twosided\" {}\n", sides > 1.0);
+        let light = format!("AreaLightSource 'diffuse' 'float power' 10 'bool twosided' {}\n", sides > 1.0);
         let loaded = folder.world(&format!("{light}{shape}")).unwrap();
         let said = loaded.warnings.iter().any(|w| w.what.contains("where pbrt gives it to each"));
         assert_eq!(said, shape == SQUARE, "{shape}: {:?}", loaded.warnings);
@@ -631,25 +619,24 @@ fn area_lights_show_pictures() {
     // The camera looks at the middle: the upper half of the picture above it, and the lower below
     let at = |y: f32, more: &str| {
         let quad = format!(
-            "Translate 0 {y} 0 Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
-            \"point2 uv\" [0 0 1 0 1 1 0 1] \"integer indices\" [0 1 2 0 2 3]"
+            "Translate 0 {y} 0 Shape 'trianglemesh' 'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
+            'point2 uv' [0 0 1 0 1 1 0 1] 'integer indices' [0 1 2 0 2 3]"
         );
-        folder.see(&format!("AreaLightSource \"diffuse\" \"string filename\" \"a.png\" {more}\n{quad}"))
+        folder.see(&format!("AreaLightSource 'diffuse' 'string filename' 'a.png' {more}\n{quad}"))
     };
     close(at(-0.5, ""), [1.0; 3], 1e-3, "top");
     close(at(0.5, ""), [red, 0.0, 0.0], 1e-3, "bottom");
-    close(at(-0.5, "\"float scale\" 5"), [5.0; 3], 1e-3, "scaled");
+    close(at(-0.5, "'float scale' 5"), [5.0; 3], 1e-3, "scaled");
     let mean = (1.0 + 0.2126 * red) / 2.0;
-    close(at(-0.5, "\"float power\" 10"), [10.0 / (PI * 4.0 * mean); 3], 2e-3, "power");
+    close(at(-0.5, "'float power' 10"), [10.0 / (PI * 4.0 * mean); 3], 2e-3, "power");
 }
 
 /// A map has the illuminance that pbrt gives it, which takes 2π for the sphere of 4π.
 #[test]
 fn maps_have_the_illuminance_that_is_asked_for() {
     let folder = Folder::new().with_exr("sky.exr", 64, &[[3.0; 3]; 64 * 64]);
-    let world = format!(
-        "LightSource \"infinite\" \"string filename\" \"sky.exr\" \"float illuminance\" 7\n{GREY}{SQUARE}"
-    );
+    let world =
+        format!("LightSource 'infinite' 'string filename' 'sky.exr' 'float illuminance' 7\n{GREY}{SQUARE}");
     // A sky of 1 makes ½ there: the cosine over half of the pixels has the mean ½
     close(folder.see(&world), [7.0 / (2.0 * PI * 0.25) * 0.5; 3], 0.02, "map");
 }
@@ -660,15 +647,15 @@ fn colours_are_of_their_space() {
     let folder = Folder::new();
     // ITU-R BT.2087, table 2
     let mixed = [0.5183, 0.5022, 0.2206];
-    let light = "AreaLightSource \"diffuse\" \"rgb L\" [.5 .5 .25]\n";
-    close(folder.see(&format!("ColorSpace \"rec2020\" {light}{SQUARE}")), mixed, 2e-3, "light");
+    let light = "AreaLightSource 'diffuse' 'rgb L' [.5 .5 .25]\n";
+    close(folder.see(&format!("ColorSpace 'rec2020' {light}{SQUARE}")), mixed, 2e-3, "light");
     close(
-        folder.see(&format!("AttributeBegin ColorSpace \"rec2020\" AttributeEnd {light}{SQUARE}")),
+        folder.see(&format!("AttributeBegin ColorSpace 'rec2020' AttributeEnd {light}{SQUARE}")),
         [0.5, 0.5, 0.25],
         1e-3,
         "outside",
     );
-    let surface = "ColorSpace \"rec2020\" Material \"diffuse\" \"rgb reflectance\" [.5 .5 .25]\n";
+    let surface = "ColorSpace 'rec2020' Material 'diffuse' 'rgb reflectance' [.5 .5 .25]\n";
     close(folder.see(&format!("{SKY}{surface}{SQUARE}")), mixed, 2e-3, "surface");
 }
 
@@ -679,10 +666,10 @@ fn textures_are_made_of_their_operands() {
     // A sky of 1 on what covers the picture; squares of 1/8 of it
     let seen = |texture: &str| {
         let text = format!(
-            "LookAt 0 0 5 0 0 0 0 1 0 Camera \"orthographic\" \"float screenwindow\" [-1 1 -1 1]
-            Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 WorldBegin {SKY}{texture}
-            Material \"diffuse\" \"texture reflectance\" \"t\" {}",
-            SQUARE.replace("\"point3 P\"", "\"point2 uv\" [0 0 8 0 8 8 0 8] \"point3 P\"")
+            "LookAt 0 0 5 0 0 0 0 1 0 Camera 'orthographic' 'float screenwindow' [-1 1 -1 1]
+            Film 'rgb' 'integer xresolution' 8 'integer yresolution' 8 WorldBegin {SKY}{texture}
+            Material 'diffuse' 'texture reflectance' 't' {}",
+            SQUARE.replace("'point3 P'", "'point2 uv' [0 0 8 0 8 8 0 8] 'point3 P'")
         );
         let loaded =
             folder.load_with(&text, &LoadOptions::default()).unwrap_or_else(|e| panic!("{texture}: {e}"));
@@ -691,58 +678,58 @@ fn textures_are_made_of_their_operands() {
         let mean: [f32; 3] = std::array::from_fn(|c| pixels.iter().map(|p| p[c]).sum::<f32>() / 64.0);
         (mean, warnings)
     };
-    let colour = "Texture \"t\" \"spectrum\"";
+    let colour = "Texture 't' 'spectrum'";
     for (texture, want) in [
-        (format!("{colour} \"checkerboard\""), [0.5; 3]),
-        (format!("{colour} \"checkerboard\" \"rgb tex1\" [.4 .4 .4]"), [0.2; 3]),
-        (format!("{colour} \"checkerboard\" \"rgb tex2\" [.4 .4 .4]"), [0.7; 3]),
-        (format!("{colour} \"mix\" \"rgb tex2\" [.4 .4 .4]"), [0.2; 3]),
-        (format!("{colour} \"mix\" \"rgb tex1\" [.4 .4 .4]"), [0.7; 3]),
+        (format!("{colour} 'checkerboard'"), [0.5; 3]),
+        (format!("{colour} 'checkerboard' 'rgb tex1' [.4 .4 .4]"), [0.2; 3]),
+        (format!("{colour} 'checkerboard' 'rgb tex2' [.4 .4 .4]"), [0.7; 3]),
+        (format!("{colour} 'mix' 'rgb tex2' [.4 .4 .4]"), [0.2; 3]),
+        (format!("{colour} 'mix' 'rgb tex1' [.4 .4 .4]"), [0.7; 3]),
         (
             format!(
-                "Texture \"a\" \"float\" \"constant\" \"float value\" .25
-                {colour} \"mix\" \"texture amount\" \"a\" \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0]"
+                "Texture 'a' 'float' 'constant' 'float value' .25
+                {colour} 'mix' 'texture amount' 'a' 'rgb tex1' [1 0 0] 'rgb tex2' [0 1 0]"
             ),
             [0.75, 0.25, 0.0],
         ),
         // By a picture: half of the squares are of one, half of the other
         (
             format!(
-                "Texture \"a\" \"float\" \"checkerboard\"
-                {colour} \"mix\" \"texture amount\" \"a\" \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 .5 0]"
+                "Texture 'a' 'float' 'checkerboard'
+                {colour} 'mix' 'texture amount' 'a' 'rgb tex1' [1 0 0] 'rgb tex2' [0 .5 0]"
             ),
             [0.5, 0.25, 0.0],
         ),
         // The factor is a float texture, also where a colour is called so
         (
             format!(
-                "Texture \"m\" \"float\" \"constant\" \"float value\" .25 Texture \"m\" \"spectrum\" \"constant\" \"rgb value\" [.9 .9 .9]
-                Texture \"c\" \"spectrum\" \"constant\" \"rgb value\" [.8 .8 .8]
-                {colour} \"scale\" \"texture tex\" \"c\" \"texture scale\" \"m\""
+                "Texture 'm' 'float' 'constant' 'float value' .25 Texture 'm' 'spectrum' 'constant' 'rgb value' [.9 .9 .9]
+                Texture 'c' 'spectrum' 'constant' 'rgb value' [.8 .8 .8]
+                {colour} 'scale' 'texture tex' 'c' 'texture scale' 'm'"
             ),
             [0.2; 3],
         ),
-        (format!("{colour} \"scale\" \"float scale\" .3"), [0.3; 3]),
+        (format!("{colour} 'scale' 'float scale' .3"), [0.3; 3]),
         // Values above 1 are cut off where they reflect, not before
         (
             format!(
-                "Texture \"four\" \"float\" \"constant\" \"float value\" 4
-                {colour} \"scale\" \"rgb tex\" [.2 .1 .5] \"texture scale\" \"four\""
+                "Texture 'four' 'float' 'constant' 'float value' 4
+                {colour} 'scale' 'rgb tex' [.2 .1 .5] 'texture scale' 'four'"
             ),
             [0.8, 0.4, 1.0],
         ),
         (
             format!(
-                "Texture \"two\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [.8 .8 .8]
-                Texture \"four\" \"spectrum\" \"scale\" \"texture tex\" \"two\" \"float scale\" 4
-                {colour} \"scale\" \"texture tex\" \"four\" \"float scale\" .25"
+                "Texture 'two' 'spectrum' 'checkerboard' 'rgb tex1' [.8 .8 .8]
+                Texture 'four' 'spectrum' 'scale' 'texture tex' 'two' 'float scale' 4
+                {colour} 'scale' 'texture tex' 'four' 'float scale' .25"
             ),
             [0.4; 3],
         ),
         (
             format!(
-                "Texture \"two\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [.8 .8 .8]
-                {colour} \"scale\" \"texture tex\" \"two\" \"float scale\" 4"
+                "Texture 'two' 'spectrum' 'checkerboard' 'rgb tex1' [.8 .8 .8]
+                {colour} 'scale' 'texture tex' 'two' 'float scale' 4"
             ),
             [0.5; 3],
         ),
@@ -751,14 +738,14 @@ fn textures_are_made_of_their_operands() {
         close(got, want, 1e-3, &texture);
         assert_eq!(warnings, 0, "{texture}");
     }
-    let error = folder.world("Texture \"t\" \"number\" \"constant\"").unwrap_err();
+    let error = folder.world("Texture 't' 'number' 'constant'").unwrap_err();
     assert!(error.contains("line 3: a texture is of `float` or `spectrum`, not of `number`"), "{error}");
     // Cut-outs: a float checkerboard lets half of the sky pass before a black square
     let text = format!(
-        "{SKY}Texture \"t\" \"float\" \"checkerboard\" Material \"diffuse\" \"rgb reflectance\" [0 0 0] {}",
+        "{SKY}Texture 't' 'float' 'checkerboard' Material 'diffuse' 'rgb reflectance' [0 0 0] {}",
         SQUARE.replace(
-            "\"point3 P\"",
-            "\"texture alpha\" \"t\" \"point2 uv\" [.5 .5 2.5 .5 2.5 2.5 .5 2.5] \"point3 P\""
+            "'point3 P'",
+            "'texture alpha' 't' 'point2 uv' [.5 .5 2.5 .5 2.5 2.5 .5 2.5] 'point3 P'"
         )
     );
     // The middle is at (1.5, 1.5), in a square like that at (0.5, 0.5), which is of tex1
@@ -777,43 +764,43 @@ fn attributes_are_for_all_that_comes() {
     let white = image::RgbImage::from_pixel(1, 1, image::Rgb([255; 3]));
     let folder = Folder::new();
     white.save(folder.path().join("w.png")).unwrap();
-    let grey = "Attribute \"material\" \"rgb reflectance\" [.2 .2 .2]\n";
+    let grey = "Attribute 'material' 'rgb reflectance' [.2 .2 .2]\n";
     for (world, want) in [
-        (format!("{SKY}{grey}Material \"diffuse\" {SQUARE}"), 0.2),
-        (format!("{SKY}{grey}Material \"diffuse\" \"rgb reflectance\" [.3 .3 .3] {SQUARE}"), 0.3),
-        (format!("{SKY}AttributeBegin {grey}AttributeEnd Material \"diffuse\" {SQUARE}"), 0.5),
-        (format!("{SKY}{grey}MakeNamedMaterial \"m\" \"string type\" \"diffuse\" NamedMaterial \"m\" {SQUARE}"), 0.2),
+        (format!("{SKY}{grey}Material 'diffuse' {SQUARE}"), 0.2),
+        (format!("{SKY}{grey}Material 'diffuse' 'rgb reflectance' [.3 .3 .3] {SQUARE}"), 0.3),
+        (format!("{SKY}AttributeBegin {grey}AttributeEnd Material 'diffuse' {SQUARE}"), 0.5),
+        (format!("{SKY}{grey}MakeNamedMaterial 'm' 'string type' 'diffuse' NamedMaterial 'm' {SQUARE}"), 0.2),
         (
             format!(
-                "{SKY}Texture \"c\" \"spectrum\" \"constant\" \"rgb value\" [.2 .2 .2]
-                Attribute \"material\" \"texture reflectance\" \"c\" Material \"diffuse\" {SQUARE}"
+                "{SKY}Texture 'c' 'spectrum' 'constant' 'rgb value' [.2 .2 .2]
+                Attribute 'material' 'texture reflectance' 'c' Material 'diffuse' {SQUARE}"
             ),
             0.2,
         ),
         (
-            format!("Attribute \"light\" \"float scale\" [.25] AreaLightSource \"diffuse\" \"rgb L\" [2 2 2] {SQUARE}"),
+            format!("Attribute 'light' 'float scale' [.25] AreaLightSource 'diffuse' 'rgb L' [2 2 2] {SQUARE}"),
             0.5,
         ),
-        ("Attribute \"light\" \"float scale\" [.25] LightSource \"infinite\" \"rgb L\" [2 2 2]".to_owned(), 0.5),
+        ("Attribute 'light' 'float scale' [.25] LightSource 'infinite' 'rgb L' [2 2 2]".to_owned(), 0.5),
         (
             format!(
-                "{SKY}Attribute \"texture\" \"float scale\" [.5] Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"w.png\"
-                Material \"diffuse\" \"texture reflectance\" \"t\" {SQUARE}"
+                "{SKY}Attribute 'texture' 'float scale' [.5] Texture 't' 'spectrum' 'imagemap' 'string filename' 'w.png'
+                Material 'diffuse' 'texture reflectance' 't' {SQUARE}"
             ),
             0.5,
         ),
-        (format!("{SKY}Attribute \"shape\" \"float alpha\" 0 Material \"diffuse\" {SQUARE}"), 1.0),
+        (format!("{SKY}Attribute 'shape' 'float alpha' 0 Material 'diffuse' {SQUARE}"), 1.0),
     ] {
         let loaded = folder.world(&world).unwrap_or_else(|e| panic!("{world}: {e}"));
         assert_eq!(loaded.warnings, [], "{world}");
         close(look(loaded, 1)[0], [want; 3], 2e-3, &world);
     }
-    let error = folder.world("Attribute \"materials\" \"rgb reflectance\" [.2 .2 .2]").unwrap_err();
+    let error = folder.world("Attribute 'materials' 'rgb reflectance' [.2 .2 .2]").unwrap_err();
     assert!(
         error.contains("line 3: Attribute \"materials\": it is for shape, light, material, medium, texture"),
         "{error}"
     );
-    let odd = folder
-        .world(&format!("{SKY}Attribute \"material\" \"float wobble\" 1 Material \"diffuse\" {SQUARE}"));
+    let odd =
+        folder.world(&format!("{SKY}Attribute 'material' 'float wobble' 1 Material 'diffuse' {SQUARE}"));
     assert_eq!(odd.unwrap().warnings[0].what, "`wobble` of the material `diffuse` is ignored");
 }

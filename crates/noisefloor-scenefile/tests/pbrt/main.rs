@@ -1,17 +1,8 @@
 //! Tests of pbrt scenes, one module a subject.
+#![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
-/// What is broken or not supported, and where.
-#[cfg(test)]
-mod bad;
-/// What is taken where a parameter is not given.
-#[cfg(test)]
-mod defaults;
-/// Damaged files are errors or scenes, never a panic.
-#[cfg(test)]
-mod hostile;
-/// What scenes look like.
-#[cfg(test)]
-mod looks;
-/// Scenes to write, load and look at.
-#[cfg(test)]
-mod util;
+mod bad; // what is broken or not supported, and where
+mod defaults; // what is taken where a parameter is not given
+mod hostile; // damaged files are errors or scenes, never a panic
+mod looks; // what scenes look like
+mod util; // scenes to write, load and look at

@@ -7,7 +7,7 @@ use tempfile::TempDir;
 /// A camera 5 units up the z axis that looks down it through a pinhole.
 pub(crate) const CAMERA: &str = "LookAt 0 0 5  0 0 0  0 1 0 Camera \"perspective\" \"float fov\" 0.1\n";
 
-/// A folder for a scene and its files.
+/// A folder for a scene and its files. Scenes may have `'` for `"`.
 pub(crate) struct Folder(TempDir);
 
 impl Folder {
@@ -20,6 +20,10 @@ impl Folder {
     }
 
     pub(crate) fn with(self, name: &str, bytes: impl AsRef<[u8]>) -> Self {
+        let mut bytes = bytes.as_ref().to_vec();
+        if name.ends_with(".pbrt") {
+            bytes.iter_mut().filter(|byte| **byte == b'\'').for_each(|byte| *byte = b'"');
+        }
         std::fs::write(self.path().join(name), bytes).unwrap();
         self
     }
@@ -32,7 +36,7 @@ impl Folder {
 
     pub(crate) fn load_with(&self, text: &str, options: &LoadOptions) -> Result<Loaded, String> {
         let path = self.path().join("scene.pbrt");
-        std::fs::write(&path, text).unwrap();
+        std::fs::write(&path, text.replace('\'', "\"")).unwrap();
         load_with(&path, options).map_err(|error| {
             let findings: Vec<String> = error.findings().iter().map(ToString::to_string).collect();
             findings.join("\n")
