@@ -1,6 +1,6 @@
 //! Files that appear complete or not at all, even if the power fails.
 
-use crate::error::WriteError;
+use crate::error::{WriteError, WriteFault};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::fs::{self, File, TryLockError};
@@ -34,8 +34,8 @@ const ATTEMPTS: usize = 16;
 /// ```
 ///
 /// # Errors
-/// [`WriteError::Folder`] if the folder does not exist or is not writable, [`WriteError::NotAFile`] if the
-/// path is a folder or a device, [`WriteError::Failed`] with the cause if `write` failed or the disk is full.
+/// [`WriteFault::Folder`] if the folder does not exist or is not writable, [`WriteFault::NotAFile`] if the
+/// path is a folder or a device, [`WriteFault::Failed`] with the cause if `write` failed or the disk is full.
 pub fn write_atomic<E>(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), E>,
@@ -88,7 +88,7 @@ fn write_through<E>(
 where
     E: Into<Box<dyn Error + Send + Sync>>,
 {
-    let failed = |source: Box<dyn Error + Send + Sync>| WriteError::Failed { path: path.to_owned(), source };
+    let failed = |source: Box<dyn Error + Send + Sync>| WriteFault::Failed(source).of(path);
     let place = Place::find(path)?;
 
     // Write beside it
@@ -115,14 +115,14 @@ struct Place<'a> {
 impl<'a> Place<'a> {
     /// Refuses to replace a folder or a device.
     fn find(path: &'a Path) -> Result<Self, WriteError> {
-        let failed = |e: io::Error| WriteError::Failed { path: path.to_owned(), source: e.into() };
+        let failed = |e: io::Error| WriteFault::Failed(e.into()).of(path);
         let target = match fs::metadata(path) {
             Ok(meta) if meta.is_file() => fs::canonicalize(path).map_err(failed)?,
-            Ok(_) => return Err(WriteError::NotAFile { path: path.to_owned() }),
+            Ok(_) => return Err(WriteFault::NotAFile.of(path)),
             Err(_) => path.to_owned(),
         };
         if target.file_name().is_none() {
-            return Err(WriteError::NotAFile { path: path.to_owned() });
+            return Err(WriteFault::NotAFile.of(path));
         }
         let folder = match target.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
@@ -134,10 +134,7 @@ impl<'a> Place<'a> {
     /// A temporary file in the folder, locked as long as it is open, so that nobody sweeps it away.
     fn temporary(&self) -> Result<NamedTempFile, WriteError> {
         sweep_once(&self.folder);
-        let refused = |source| {
-            let (path, folder) = (self.path.to_owned(), self.folder.clone());
-            WriteError::Folder { path, folder, source }
-        };
+        let refused = |source| WriteFault::Folder { folder: self.folder.clone(), source }.of(self.path);
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
@@ -238,7 +235,7 @@ mod tests {
         for (fails, there) in [("sync file", "old"), ("rename", "old"), ("sync folder", "new")] {
             fs::write(&path, "old").unwrap();
             let disk = Recorder { fails: Some(fails), ..Recorder::default() };
-            assert!(matches!(write(&disk, &path), Err(WriteError::Failed { .. })), "{fails}");
+            assert!(matches!(write(&disk, &path).unwrap_err().fault, WriteFault::Failed(_)), "{fails}");
             assert_eq!(disk.steps.borrow().last(), Some(&fails));
             assert_eq!(fs::read_to_string(&path).unwrap(), there, "{fails}");
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "{fails}");

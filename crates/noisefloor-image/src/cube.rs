@@ -1,6 +1,6 @@
 //! `.cube` files.
 
-use crate::error::PictureError;
+use crate::error::{PictureError, PictureFault};
 use crate::open::Opened;
 use noisefloor::display::{ColourLut, parse_cube};
 use std::io::Read;
@@ -17,14 +17,11 @@ pub fn read_cube(path: impl AsRef<Path>) -> Result<ColourLut, PictureError> {
     let path = path.as_ref();
     let Opened { reader, bytes, .. } = Opened::open(path)?;
     if bytes > MAX_BYTES {
-        return Err(PictureError::Long { path: path.to_owned(), bytes, limit: MAX_BYTES });
+        return Err(PictureFault::Long { bytes, limit: MAX_BYTES }.of(path));
     }
     let mut text = Vec::new();
-    let io = |source| PictureError::Io { path: path.to_owned(), source };
+    let io = |source| PictureFault::Io(source).of(path);
     reader.take(MAX_BYTES).read_to_end(&mut text).map_err(io)?;
-    parse_cube(&text).map_err(|error| PictureError::Broken {
-        path: path.to_owned(),
-        format: "cube",
-        reason: error.to_string(),
-    })
+    parse_cube(&text)
+        .map_err(|error| PictureFault::Broken { format: "cube", reason: error.to_string() }.of(path))
 }

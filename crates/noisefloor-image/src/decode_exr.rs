@@ -5,7 +5,7 @@
 //! be placed in the display window.
 
 use crate::colours::ToRec709;
-use crate::error::PictureError;
+use crate::error::{PictureError, PictureFault};
 use crate::open::{Format, Opened, check_size, guarded};
 use crate::picture::LinearImage;
 use exr::block::UncompressedBlock;
@@ -37,7 +37,7 @@ const NAMES_SHOWN: usize = 20;
 ///
 /// Of several parts and layers with R, G and B, the picture is read: the unnamed one, or one that is named as renderers
 /// name it (`ViewLayer.Combined`, `rgba`, `beauty`, `image`, …), or the only one that is not named as a pass of normals,
-/// albedo and the like. If more than one is left, [`PictureError::Layers`] asks which. If no layer has colours, a lone
+/// albedo and the like. If more than one is left, [`PictureFault::Layers`] asks which. If no layer has colours, a lone
 /// unnamed Y is read as grey. Other channels are ignored, alpha among them; colour is as stored, that is,
 /// premultiplied.
 ///
@@ -72,7 +72,7 @@ pub(crate) struct Layout {
 
 pub(crate) fn layout_of(path: &Path, opened: Opened) -> Result<Layout, PictureError> {
     guarded(path, "EXR", || {
-        let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
+        let broken = |reason: String| PictureFault::Broken { format: "EXR", reason }.of(path);
         let wanted = opened.layer.as_deref();
         let reader = exr::block::read(opened.reader, false).map_err(|e| broken(e.to_string()))?;
         let parts = reader.headers();
@@ -93,7 +93,7 @@ pub(crate) fn alpha_of(path: &Path, opened: Opened) -> Result<LinearImage, Pictu
 type Chooser = fn(&Path, &[Header], Option<&str>) -> Result<Choice, PictureError>;
 
 fn decode_unguarded(path: &Path, opened: Opened, choose: Chooser) -> Result<LinearImage, PictureError> {
-    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "EXR", reason };
+    let broken = |reason: String| PictureFault::Broken { format: "EXR", reason }.of(path);
 
     // Headers: which part, which channels, how large; nothing that the file is too short for
     let most = opened.most_pixels;
@@ -121,16 +121,15 @@ fn decode_unguarded(path: &Path, opened: Opened, choose: Chooser) -> Result<Line
 
     let beside = decoded.saturating_sub(shown.saturating_mul(size_of::<Rgb>() as u64));
     if beside > opened.bytes.saturating_mul(BESIDE_A_BYTE).saturating_add(FREE_BESIDE) {
-        return Err(PictureError::Unsupported {
-            path: path.to_owned(),
+        return Err(PictureFault::Unsupported {
             what: "the channels beside its colours are out of proportion to the file",
             advice: "save the picture by itself",
-        });
+        }
+        .of(path));
     }
 
     // Pixels start black, if there is memory for them
-    let refused =
-        |_| PictureError::Memory { path: path.to_owned(), width: window.width, height: window.height };
+    let refused = |_| PictureFault::Memory { width: window.width, height: window.height }.of(path);
     Vec::<Rgb>::new().try_reserve_exact(window.width * window.height).map_err(refused)?;
     let mut pixels = vec![[0.0; 3]; window.width * window.height];
 
@@ -163,10 +162,14 @@ fn to_rec709(path: &Path, part: &Header) -> Result<Option<ToRec709>, PictureErro
     let [red, green, blue, white] =
         [&stated.red, &stated.green, &stated.blue, &stated.white].map(|c| [f64::from(c.0), f64::from(c.1)]);
     let neutral = part.own_attributes.adopted_neutral.map(|c| [f64::from(c.0), f64::from(c.1)]);
-    ToRec709::new(&Chromaticities { red, green, blue, white }, neutral).map_err(|()| PictureError::Colours {
-        path: path.to_owned(),
-        stated: format!("chromaticities that no colours have: {red:?}, {green:?}, {blue:?}, white {white:?}"),
-        advice: "correct the attribute, or remove it if the colours are Rec.709",
+    ToRec709::new(&Chromaticities { red, green, blue, white }, neutral).map_err(|()| {
+        PictureFault::Colours {
+            stated: format!(
+                "chromaticities that no colours have: {red:?}, {green:?}, {blue:?}, white {white:?}"
+            ),
+            advice: "correct the attribute, or remove it if the colours are Rec.709",
+        }
+        .of(path)
     })
 }
 
@@ -292,7 +295,7 @@ fn the_picture<'l>(
         let ends: Vec<_> = layers.iter().filter(behind).collect();
         return match (exact.as_slice(), ends.as_slice()) {
             ([layer, ..], _) | ([], [layer]) => Ok(Some(layer)),
-            _ => Err(PictureError::NoLayer { path: path.to_owned(), layer: wanted, found: found() }),
+            _ => Err(PictureFault::NoLayer { layer: wanted, found: found() }.of(path)),
         };
     }
     let likelihood = |layer: &Layer| Likelihood::of(&layer.name);
@@ -302,7 +305,7 @@ fn the_picture<'l>(
         [layer] => Ok(Some(layer)),
         // Parts that have no names come in their order
         [first, ..] if first.name.is_empty() => Ok(Some(first)),
-        _ => Err(PictureError::Layers { path: path.to_owned(), found: found() }),
+        _ => Err(PictureFault::Layers(found()).of(path)),
     }
 }
 
@@ -320,9 +323,7 @@ fn choose_alpha(path: &Path, parts: &[Header], wanted: Option<&str>) -> Result<C
     let alpha = format!("{}A", red.strip_suffix(['R', 'Y']).unwrap_or_default());
     match names.iter().position(|name| *name == alpha) {
         Some(alpha) => Ok(Choice { part, channels: [alpha; 3] }),
-        None => {
-            Err(PictureError::Channels { path: path.to_owned(), missing: alpha, found: names.join(", ") })
-        }
+        None => Err(PictureFault::Channels { missing: alpha, found: names.join(", ") }.of(path)),
     }
 }
 
@@ -344,18 +345,18 @@ fn choose(path: &Path, parts: &[Header], wanted: Option<&str>) -> Result<Choice,
         let missing =
             if missing.is_empty() { "R, G and B in one part".to_owned() } else { missing.join(", ") };
         let found = if all.is_empty() { "none".to_owned() } else { listed(all.into_iter()) };
-        PictureError::Channels { path: path.to_owned(), missing, found }
+        PictureFault::Channels { missing, found }.of(path)
     })
 }
 
 /// Pictures of luminance and chroma have a quarter of their chroma.
 fn subsampled(path: &Path) -> PictureError {
     let what = "subsampled channels, as of luminance and chroma (Y, RY, BY), are not read";
-    PictureError::Unsupported { path: path.to_owned(), what, advice: "save R, G and B at full resolution" }
+    PictureFault::Unsupported { what, advice: "save R, G and B at full resolution" }.of(path)
 }
 
 fn check_part(path: &Path, part: &Header, most: usize) -> Result<(), PictureError> {
-    let unsupported = |what, advice| Err(PictureError::Unsupported { path: path.to_owned(), what, advice });
+    let unsupported = |what, advice| Err(PictureFault::Unsupported { what, advice }.of(path));
     if part.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1) {
         return Err(subsampled(path));
     }
@@ -392,11 +393,7 @@ impl Window {
         let meets = |start: i64, data: usize, shown: usize| start < shown as i64 && start + data as i64 > 0;
         if !meets(x, part.layer_size.width(), width) || !meets(y, part.layer_size.height(), height) {
             let what = "its data window lies outside its display window";
-            return Err(PictureError::Unsupported {
-                path: path.to_owned(),
-                what,
-                advice: "save it uncropped",
-            });
+            return Err(PictureFault::Unsupported { what, advice: "save it uncropped" }.of(path));
         }
         Ok(Self { width, height, x, y })
     }

@@ -1,6 +1,6 @@
 //! PFM to linear RGB.
 
-use crate::error::PictureError;
+use crate::error::{PictureError, PictureFault};
 use crate::open::{Format, Opened, check_size};
 use crate::picture::LinearImage;
 use noisefloor::Rgb;
@@ -30,9 +30,9 @@ pub fn read_pfm(path: impl AsRef<Path>) -> Result<LinearImage, PictureError> {
 pub(crate) fn decode(path: &Path, mut opened: Opened) -> Result<LinearImage, PictureError> {
     let broken = |reason: &str| {
         let reason = reason.to_owned();
-        PictureError::Broken { path: path.to_owned(), format: "PFM", reason }
+        PictureFault::Broken { format: "PFM", reason }.of(path)
     };
-    let io = |source| PictureError::Io { path: path.to_owned(), source };
+    let io = |source| PictureFault::Io(source).of(path);
 
     // Header
     let mut header = 0;

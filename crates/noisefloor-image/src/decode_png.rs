@@ -1,7 +1,7 @@
 //! PNG to display values.
 
 use crate::colours::{Curve, Stated, ToRec709, Treatment, is_srgb};
-use crate::error::PictureError;
+use crate::error::{PictureError, PictureFault};
 use crate::open::{Format, Opened, check_size, guarded};
 use crate::picture::DisplayImage;
 use noisefloor::Rgb;
@@ -79,7 +79,7 @@ pub(crate) fn decode(
             Treatment::Refuse(stated) => {
                 let (stated, advice) =
                     (stated.describe(), "save it with the colours that this display takes");
-                return Err(PictureError::Colours { path: path.to_owned(), stated, advice });
+                return Err(PictureFault::Colours { stated, advice }.of(path));
             }
         }
         Ok(DisplayImage { width, height, pixels, step })
@@ -88,13 +88,11 @@ pub(crate) fn decode(
 
 /// The colours that the chunks before the pixels state; none if they are those of sRGB.
 fn stated(path: &Path, opened: &mut Opened) -> Result<Option<Stated>, PictureError> {
-    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
-    let refused = |stated: String| PictureError::Colours {
-        path: path.to_owned(),
-        stated,
-        advice: "save it with the colours of sRGB",
+    let broken = |reason: String| PictureFault::Broken { format: "PNG", reason }.of(path);
+    let refused = |stated: String| {
+        PictureFault::Colours { stated, advice: "save it with the colours of sRGB" }.of(path)
     };
-    let io = |source| PictureError::Io { path: path.to_owned(), source };
+    let io = |source| PictureFault::Io(source).of(path);
     let chunks = chunks_before_pixels(&mut opened.reader).map_err(io)?;
     opened.reader.rewind().map_err(io)?;
     let limits = png::Limits { bytes: MAX_PNG_EXTRA as usize };
@@ -242,7 +240,7 @@ impl Stored {
 }
 
 fn decode_raw(path: &Path, opened: Opened) -> Result<Stored, PictureError> {
-    let broken = |reason: String| PictureError::Broken { path: path.to_owned(), format: "PNG", reason };
+    let broken = |reason: String| PictureFault::Broken { format: "PNG", reason }.of(path);
     // Header: the size, and whether the file is long enough to hold that many pixels
     let limits = png::Limits { bytes: MAX_PNG_EXTRA as usize };
     let mut decoder = png::Decoder::new_with_limits(opened.reader, limits);

@@ -2,68 +2,52 @@
 
 use noisefloor::tile::TileError;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Why a picture could not be read.
 #[derive(Debug, Error)]
+#[error("{}: {fault}", path.display())]
+pub struct PictureError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub fault: PictureFault,
+}
+
+/// What is wrong with a picture.
+#[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum PictureError {
+pub enum PictureFault {
     /// The operating system could not read it.
-    #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    #[error("cannot be read: {0}; check the path and its permissions")]
+    Io(io::Error),
     /// Not the expected format.
-    #[error("{}: is {found}, not {wanted}; the content tells the format, not the name", path.display())]
+    #[error("is {found}, not {wanted}; the content tells the format, not the name")]
     Foreign {
-        /// The file.
-        path: PathBuf,
         /// What it looks like.
         found: &'static str,
         /// What it should be.
         wanted: &'static str,
     },
-    /// A file that stands for the picture: a pointer of Git LFS or git-annex, or a web page.
-    #[error("{}: {instead}", path.display())]
-    StandIn {
-        /// The file.
-        path: PathBuf,
-        /// What it is, and what to do.
-        instead: &'static str,
-    },
+    /// A file that stands for the picture: a pointer of Git LFS or git-annex, or a web page. It says what it is, and what
+    /// to do.
+    #[error("{0}")]
+    StandIn(&'static str),
     /// The file is longer than [`MAX_FILE_BYTES`](crate::MAX_FILE_BYTES).
-    #[error(
-        "{}: {bytes} bytes exceed the limit of {limit}; save fewer layers or a smaller image",
-        path.display()
-    )]
+    #[error("{bytes} bytes exceed the limit of {limit}; save fewer layers or a smaller image")]
     Long {
-        /// The file.
-        path: PathBuf,
         /// Its length in bytes.
         bytes: u64,
         /// The limit in bytes.
         limit: u64,
     },
     /// The header names a size outside the limits of [`noisefloor::tile`]; no pixel was allocated.
-    #[error("{}: {source}; crop or scale the image", path.display())]
-    Size {
-        /// The file.
-        path: PathBuf,
-        /// The size, and the limits.
-        source: TileError,
-    },
+    #[error("{0}; crop or scale the image")]
+    Size(TileError),
     /// More pixels than the caller accepts; none was allocated.
-    #[error(
-        "{}: {width}×{height} pixels exceed the limit of {most} pixels here; crop the image",
-        path.display()
-    )]
+    #[error("{width}×{height} pixels exceed the limit of {most} pixels here; crop the image")]
     Large {
-        /// The file.
-        path: PathBuf,
         /// Width in pixels.
         width: usize,
         /// Height in pixels.
@@ -72,98 +56,69 @@ pub enum PictureError {
         most: usize,
     },
     /// The image is within the limits, but its memory could not be allocated.
-    #[error(
-        "{}: no memory for {width}×{height} pixels; close other programs or use a smaller image",
-        path.display()
-    )]
+    #[error("no memory for {width}×{height} pixels; close other programs or use a smaller image")]
     Memory {
-        /// The file.
-        path: PathBuf,
         /// Width in pixels.
         width: usize,
         /// Height in pixels.
         height: usize,
     },
     /// The file is cut short or corrupt.
-    #[error("{}: broken {format} file: {reason}; write it again", path.display())]
+    #[error("broken {format} file: {reason}; write it again")]
     Broken {
-        /// The file.
-        path: PathBuf,
         /// `"EXR"`, `"PFM"` or `"PNG"`.
         format: &'static str,
         /// What the decoder found.
         reason: String,
     },
     /// The EXR has no part with R, G and B, nor a luminance channel Y.
-    #[error(
-        "{}: no colour: channel {missing} is missing (it has {found}); save R, G and B, or only Y for grey",
-        path.display()
-    )]
+    #[error("no colour: channel {missing} is missing (it has {found}); save R, G and B, or only Y for grey")]
     Channels {
-        /// The file.
-        path: PathBuf,
         /// Names of the missing channels, comma-separated.
         missing: String,
         /// Names of the existing channels, comma-separated, at most twenty.
         found: String,
     },
-    /// It has several layers, none of which is known to be the picture, and nobody said which is meant.
+    /// It has several layers, none of which is known to be the picture, and nobody said which is meant: names of the layers
+    /// that have colours, comma-separated, at most twenty.
     #[error(
-        "{}: has the layers {found}, and does not say which is the picture; save that one by itself, \
-         or name it by --layer in `judge` and `metrics`",
-        path.display()
+        "has the layers {0}, and does not say which is the picture; save that one by itself, \
+         or name it by --layer in `judge` and `metrics`"
     )]
-    Layers {
-        /// The file.
-        path: PathBuf,
-        /// Names of the layers that have colours, comma-separated, at most twenty.
-        found: String,
-    },
+    Layers(String),
     /// It has no colours in the layer that was asked for, or in more than one that is called so.
-    #[error("{}: the layer {layer:?} is not one of those with R, G and B: {found}", path.display())]
+    #[error("the layer {layer:?} is not one of those with R, G and B: {found}")]
     NoLayer {
-        /// The file.
-        path: PathBuf,
         /// The layer.
         layer: String,
-        /// As above.
+        /// As of [`Self::Layers`].
         found: String,
     },
     /// It does not say how many samples it has, and nobody else did.
-    #[error("{}: does not say how many samples per pixel it has; give the number with --spp", path.display())]
-    NoSamples {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("does not say how many samples per pixel it has; give the number with --spp")]
+    NoSamples,
     /// Its tiles have different numbers of samples, and one for all is needed.
     #[error(
-        "{}: has {fewest} to {most} samples per pixel, not the same everywhere; \
-         judge a picture rendered with --criterion spp:N, or give one number with --spp",
-        path.display()
+        "has {fewest} to {most} samples per pixel, not the same everywhere; \
+         judge a picture rendered with --criterion spp:N, or give one number with --spp"
     )]
     UnevenSamples {
-        /// The file.
-        path: PathBuf,
         /// Fewest samples per pixel of a tile.
         fewest: u64,
         /// Most samples per pixel of a tile.
         most: u64,
     },
     /// It states colours that are not converted.
-    #[error("{}: states {stated}; {advice}", path.display())]
+    #[error("states {stated}; {advice}")]
     Colours {
-        /// The file.
-        path: PathBuf,
         /// The colours.
         stated: String,
         /// What to do about it.
         advice: &'static str,
     },
     /// A valid file that uses a feature this crate does not read.
-    #[error("{}: {what}; {advice}", path.display())]
+    #[error("{what}; {advice}")]
     Unsupported {
-        /// The file.
-        path: PathBuf,
         /// The feature.
         what: &'static str,
         /// What to do about it.
@@ -171,38 +126,41 @@ pub enum PictureError {
     },
 }
 
+impl PictureFault {
+    pub(crate) fn of(self, path: &Path) -> PictureError {
+        PictureError { path: path.to_owned(), fault: self }
+    }
+}
+
 /// Why a file could not be written. An existing file is unchanged.
 #[derive(Debug, Error)]
+#[error("{}: {fault}", path.display())]
+pub struct WriteError {
+    /// The file wanted.
+    pub path: PathBuf,
+    /// What went wrong.
+    #[source]
+    pub fault: WriteFault,
+}
+
+/// What went wrong with writing a file.
+#[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum WriteError {
+pub enum WriteFault {
     /// The folder does not exist or is not writable.
-    #[error(
-        "{}: cannot write into folder {}: {source}; choose a folder that exists and is writable",
-        path.display(),
-        folder.display()
-    )]
+    #[error("cannot write into folder {}: {source}; choose a folder that exists and is writable", folder.display())]
     Folder {
-        /// The file wanted.
-        path: PathBuf,
         /// Its folder.
         folder: PathBuf,
         /// The error of the operating system.
         source: io::Error,
     },
     /// The path names something that a file must not replace.
-    #[error("{}: is a folder or a device; choose another name", path.display())]
-    NotAFile {
-        /// The path wanted.
-        path: PathBuf,
-    },
+    #[error("is a folder or a device; choose another name")]
+    NotAFile,
     /// The number of values does not match the size.
-    #[error(
-        "{}: {what} holds {got} values, {width}×{height} pixels need {want}; pass one value per pixel",
-        path.display()
-    )]
+    #[error("{what} holds {got} values, {width}×{height} pixels need {want}; pass one value per pixel")]
     Size {
-        /// The file wanted.
-        path: PathBuf,
         /// Which of the arguments.
         what: &'static str,
         /// Width in pixels.
@@ -215,31 +173,25 @@ pub enum WriteError {
         want: usize,
     },
     /// The image is empty or larger than [`noisefloor::tile`] allows.
-    #[error("{}: {source}; write a smaller image", path.display())]
-    Image {
-        /// The file wanted.
-        path: PathBuf,
-        /// The size, and the limits.
-        source: TileError,
-    },
+    #[error("{0}; write a smaller image")]
+    Image(TileError),
     /// The image is empty, or larger than a PNG can be.
-    #[error("{}: a PNG cannot hold {width}×{height} pixels; each edge must be 1…2147483647", path.display())]
+    #[error("a PNG cannot hold {width}×{height} pixels; each edge must be 1…2147483647")]
     Png {
-        /// The file wanted.
-        path: PathBuf,
         /// Width in pixels.
         width: usize,
         /// Height in pixels.
         height: usize,
     },
     /// Writing failed half-way.
-    #[error("{}: not written: {source}; check the space on the disk", path.display())]
-    Failed {
-        /// The file wanted.
-        path: PathBuf,
-        /// What went wrong.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
+    #[error("not written: {0}; check the space on the disk")]
+    Failed(#[source] Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl WriteFault {
+    pub(crate) fn of(self, path: &Path) -> WriteError {
+        WriteError { path: path.to_owned(), fault: self }
+    }
 }
 
 /// Why a folder is not a stack, or cannot be played back.

@@ -1,6 +1,6 @@
 //! What an EXR says of its own samples: how many, of which seed, from where.
 
-use crate::error::PictureError;
+use crate::error::{PictureError, PictureFault};
 use crate::open::{Format, Opened, guarded};
 use exr::meta::attribute::AttributeValue;
 use exr::meta::header::Header;
@@ -48,11 +48,8 @@ pub fn read_facts(path: impl AsRef<Path>) -> Result<SampleFacts, PictureError> {
         return Ok(SampleFacts::default());
     }
     guarded(path, "EXR", || {
-        let reader = exr::block::read(opened.reader, false).map_err(|error| PictureError::Broken {
-            path: path.to_owned(),
-            format: "EXR",
-            reason: error.to_string(),
-        })?;
+        let reader = exr::block::read(opened.reader, false)
+            .map_err(|error| PictureFault::Broken { format: "EXR", reason: error.to_string() }.of(path))?;
         Ok(reader.headers().first().map(of_header).unwrap_or_default())
     })
 }

@@ -62,7 +62,7 @@ pub use cube::read_cube;
 pub use decode_exr::read_exr;
 pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
-pub use error::{PictureError, StackError, WriteError};
+pub use error::{PictureError, PictureFault, StackError, WriteError, WriteFault};
 pub use facts::{SampleFacts, read_facts};
 pub use frames::{Frame, batches, running_means};
 pub use open::{MAX_FILE_BYTES, ReadOptions};

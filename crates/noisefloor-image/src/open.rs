@@ -1,6 +1,6 @@
 //! Opening files that may be hostile: what the decoders share.
 
-use crate::error::PictureError;
+use crate::error::{PictureError, PictureFault};
 use noisefloor::viewing::Viewing;
 use noisefloor::{text::stand_in, tile::check_image};
 use std::fs::File;
@@ -55,17 +55,17 @@ pub(crate) struct Opened {
 
 impl Opened {
     pub(crate) fn open(path: &Path) -> Result<Self, PictureError> {
-        let io = |source| PictureError::Io { path: path.to_owned(), source };
+        let io = |source| PictureFault::Io(source).of(path);
 
         // Only regular files: a pipe or a device might block, or never end
         let meta = std::fs::metadata(path).map_err(io)?;
         if !meta.is_file() {
             let (found, wanted) = ("a folder or a device", "a regular file");
-            return Err(PictureError::Foreign { path: path.to_owned(), found, wanted });
+            return Err(PictureFault::Foreign { found, wanted }.of(path));
         }
         let bytes = meta.len();
         if bytes > MAX_FILE_BYTES {
-            return Err(PictureError::Long { path: path.to_owned(), bytes, limit: MAX_FILE_BYTES });
+            return Err(PictureFault::Long { bytes, limit: MAX_FILE_BYTES }.of(path));
         }
 
         let mut reader = BufReader::new(File::open(path).map_err(io)?);
@@ -77,7 +77,7 @@ impl Opened {
             // A flag of the version; the decoder takes deep parts for broken ones
             [0x76, 0x2f, 0x31, 0x01, _, flags, ..] if flags & 8 != 0 => {
                 let (what, advice) = ("deep pixels are not read", "flatten the image");
-                return Err(PictureError::Unsupported { path: path.to_owned(), what, advice });
+                return Err(PictureFault::Unsupported { what, advice }.of(path));
             }
             [0x76, 0x2f, 0x31, 0x01, ..] => Format::Exr,
             [b'P', b'F' | b'f', b'\n' | b'\r', ..] => Format::Pfm,
@@ -90,18 +90,18 @@ impl Opened {
     /// The layer that is asked for, which only an EXR has.
     pub(crate) fn with_layer(self, path: &Path, options: &ReadOptions) -> Result<Self, PictureError> {
         match (&options.layer, self.format) {
-            (Some(layer), Format::Pfm | Format::Png) => Err(PictureError::NoLayer {
-                path: path.to_owned(),
+            (Some(layer), Format::Pfm | Format::Png) => Err(PictureFault::NoLayer {
                 layer: layer.clone(),
                 found: "none, as only EXR files have layers".to_owned(),
-            }),
+            }
+            .of(path)),
             (layer, _) => Ok(Self { layer: layer.clone(), ..self }),
         }
     }
 
     pub(crate) fn foreign(&self, path: &Path, wanted: &'static str) -> PictureError {
         if let Format::Other(Some(instead)) = self.format {
-            return PictureError::StandIn { path: path.to_owned(), instead };
+            return PictureFault::StandIn(instead).of(path);
         }
         let found = match self.format {
             Format::Exr => "an OpenEXR file",
@@ -110,7 +110,7 @@ impl Opened {
             Format::Empty => "an empty file",
             Format::Other(_) => "something else",
         };
-        PictureError::Foreign { path: path.to_owned(), found, wanted }
+        PictureFault::Foreign { found, wanted }.of(path)
     }
 }
 
@@ -120,9 +120,9 @@ pub(crate) fn check_size(
     (width, height): (usize, usize),
     most: usize,
 ) -> Result<(), PictureError> {
-    check_image(width, height).map_err(|source| PictureError::Size { path: path.to_owned(), source })?;
+    check_image(width, height).map_err(|source| PictureFault::Size(source).of(path))?;
     if width * height > most {
-        return Err(PictureError::Large { path: path.to_owned(), width, height, most });
+        return Err(PictureFault::Large { width, height, most }.of(path));
     }
     Ok(())
 }
@@ -138,6 +138,6 @@ pub(crate) fn guarded<T>(
 ) -> Result<T, PictureError> {
     catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
         let reason = "its decoder found a contradiction".to_owned();
-        Err(PictureError::Broken { path: path.to_owned(), format, reason })
+        Err(PictureFault::Broken { format, reason }.of(path))
     })
 }

@@ -1,6 +1,6 @@
 //! Reading a picture in whichever format its first bytes announce.
 
-use crate::error::PictureError;
+use crate::error::{PictureError, PictureFault};
 use crate::facts::read_facts;
 use crate::open::{Format, Opened, ReadOptions};
 use crate::picture::Picture;
@@ -12,7 +12,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// Those of [`read_exr`](crate::read_exr), [`read_pfm`](crate::read_pfm) and [`read_png`](crate::read_png);
-/// [`PictureError::Foreign`] for any other format.
+/// [`PictureFault::Foreign`] for any other format.
 pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
     read_picture_with(path, &ReadOptions::default())
 }
@@ -20,8 +20,8 @@ pub fn read_picture(path: impl AsRef<Path>) -> Result<Picture, PictureError> {
 /// [`read_picture`], with what it leaves open.
 ///
 /// # Errors
-/// Those of [`read_picture`]; [`PictureError::Large`], [`PictureError::NoLayer`] if there is no such layer or the
-/// format has none, and [`PictureError::Colours`] if the display does not take the colours of a PNG.
+/// Those of [`read_picture`]; [`PictureFault::Large`], [`PictureFault::NoLayer`] if there is no such layer or the
+/// format has none, and [`PictureFault::Colours`] if the display does not take the colours of a PNG.
 pub fn read_picture_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Picture, PictureError> {
     let path = path.as_ref();
     let opened =
@@ -38,8 +38,8 @@ pub fn read_picture_with(path: impl AsRef<Path>, options: &ReadOptions) -> Resul
 /// says it has. Whatever it says of where they come from is kept.
 ///
 /// # Errors
-/// Those of [`read_picture`]; without `spp`, also [`PictureError::NoSamples`] and
-/// [`PictureError::UnevenSamples`].
+/// Those of [`read_picture`]; without `spp`, also [`PictureFault::NoSamples`] and
+/// [`PictureFault::UnevenSamples`].
 pub fn read_still(path: impl AsRef<Path>, spp: Option<f64>) -> Result<Still, PictureError> {
     read_still_with(path, spp, &ReadOptions::default())
 }
@@ -59,10 +59,10 @@ pub fn read_still_with(
     let spp = match (spp, facts.samples) {
         (Some(spp), _) => spp,
         (None, Some((fewest, most))) if fewest < most => {
-            return Err(PictureError::UnevenSamples { path: path.to_owned(), fewest, most });
+            return Err(PictureFault::UnevenSamples { fewest, most }.of(path));
         }
         (None, Some((_, spp))) => spp as f64,
-        (None, None) => return Err(PictureError::NoSamples { path: path.to_owned() }),
+        (None, None) => return Err(PictureFault::NoSamples.of(path)),
     };
     Ok(picture.into_still(spp).with_origin(facts.origin))
 }

@@ -1,7 +1,7 @@
 //! Writing EXR and PNG.
 
 use crate::atomic::write_atomic;
-use crate::error::WriteError;
+use crate::error::{WriteError, WriteFault};
 use crate::facts::{SampleFacts, sample_attributes};
 use crate::plane::{Channel, Channels, Plane};
 use exr::prelude::{
@@ -63,7 +63,7 @@ impl<'a> RenderLayers<'a> {
 pub fn write_exr(path: impl AsRef<Path>, layers: &RenderLayers<'_>) -> Result<(), WriteError> {
     let path = path.as_ref();
     let (width, height) = (layers.width, layers.height);
-    check_image(width, height).map_err(|source| WriteError::Image { path: path.to_owned(), source })?;
+    check_image(width, height).map_err(|source| WriteFault::Image(source).of(path))?;
     let check = |what, got: Option<usize>| {
         check_len(path, what, (width, height), got.unwrap_or(width * height), width * height)
     };
@@ -120,7 +120,7 @@ pub fn write_png(path: impl AsRef<Path>, width: usize, height: usize, rgb: &[u8]
     let edges = 1..=MAX_PNG_EDGE;
     let bytes = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(3));
     let (true, true, Some(bytes)) = (edges.contains(&width), edges.contains(&height), bytes) else {
-        return Err(WriteError::Png { path: path.to_owned(), width, height });
+        return Err(WriteFault::Png { width, height }.of(path));
     };
     check_len(path, "rgb", (width, height), rgb.len(), bytes)?;
     write_atomic(path, |writer| encode_png(writer, width, height, rgb))
@@ -152,5 +152,5 @@ fn check_len(
     if got == want {
         return Ok(());
     }
-    Err(WriteError::Size { path: path.to_owned(), what, width, height, got, want })
+    Err(WriteFault::Size { what, width, height, got, want }.of(path))
 }

@@ -1,5 +1,6 @@
 //! Exceptions.
 
+use noisefloor_image::{PictureFault, WriteFault};
 use noisefloor_rivals::MetricError;
 use pyo3::exceptions::{PyException, PyOSError, PyOverflowError};
 use pyo3::prelude::*;
@@ -84,8 +85,8 @@ impl Raise for noisefloor_eyes::EyesError {
 
 impl Raise for noisefloor_image::PictureError {
     fn raise(self) -> PyErr {
-        match &self {
-            Self::Io { path, source } => file_error(path, source),
+        match &self.fault {
+            PictureFault::Io(source) => file_error(&self.path, source),
             _ => PictureError::new_err(self.to_string()),
         }
     }
@@ -93,13 +94,13 @@ impl Raise for noisefloor_image::PictureError {
 
 impl Raise for noisefloor_image::WriteError {
     fn raise(self) -> PyErr {
-        match &self {
-            Self::Folder { source, .. } => std::io::Error::new(source.kind(), self.to_string()).into(),
-            Self::Failed { source, .. } => {
+        match &self.fault {
+            WriteFault::Folder { source, .. } => std::io::Error::new(source.kind(), self.to_string()).into(),
+            WriteFault::Failed(source) => {
                 let kind = source.downcast_ref().map_or(std::io::ErrorKind::Other, std::io::Error::kind);
                 std::io::Error::new(kind, self.to_string()).into()
             }
-            Self::NotAFile { .. } => PyOSError::new_err(self.to_string()),
+            WriteFault::NotAFile => PyOSError::new_err(self.to_string()),
             _ => PictureError::new_err(self.to_string()),
         }
     }

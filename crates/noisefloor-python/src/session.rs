@@ -14,7 +14,7 @@ use noisefloor::{
     watch::Warning,
 };
 use noisefloor_denoise::DEFAULT_JODS_LOST;
-use noisefloor_image::{WriteError, write_atomic};
+use noisefloor_image::{WriteError, WriteFault, write_atomic};
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -551,12 +551,12 @@ pub(crate) fn warn(py: Python<'_>, warnings: Vec<Warning>) -> PyResult<()> {
 
 fn save(session: &Session<Criterion>, path: &Path, job: &str) -> PyResult<()> {
     let checkpoint = session.checkpoint(job).map_err(Raise::raise)?;
-    write_atomic(path, |writer| checkpoint.write(writer)).map_err(|error| match error {
-        WriteError::Failed { path, source } => match source.downcast() {
-            Ok(error) => raise(&path, *error),
-            Err(source) => WriteError::Failed { path, source }.raise(),
+    write_atomic(path, |writer| checkpoint.write(writer)).map_err(|error| match error.fault {
+        WriteFault::Failed(source) => match source.downcast() {
+            Ok(error) => raise(path, *error),
+            Err(source) => WriteError { fault: WriteFault::Failed(source), ..error }.raise(),
         },
-        other => other.raise(),
+        fault => WriteError { fault, ..error }.raise(),
     })
 }
 

@@ -5,7 +5,7 @@ use flate2::{Compression as Level, write::ZlibEncoder};
 use moxcms::ColorProfile;
 use noisefloor::display::srgb_decode;
 use noisefloor_image::{
-    Picture, PictureError, ReadOptions, read_exr, read_picture, read_picture_with, read_png, read_unread,
+    Picture, PictureFault, ReadOptions, read_exr, read_picture, read_picture_with, read_png, read_unread,
 };
 use std::io::Write;
 use std::path::Path;
@@ -85,7 +85,7 @@ fn exrs_in_other_primaries_are_the_same_picture() {
 
     exr_with(&path, &COLOURS, [[0.3, 0.3]; 4], None);
     let error = read_exr(&path).unwrap_err();
-    assert!(matches!(&error, PictureError::Colours { .. }), "{error}");
+    assert!(matches!(&error.fault, PictureFault::Colours { .. }), "{error}");
     assert!(error.to_string().contains("0.3"), "{error}");
 }
 
@@ -235,7 +235,7 @@ fn what_is_not_converted_is_refused_by_name() {
     ] {
         png_with(&path, &[[1; 3]], &[chunk]);
         let error = read_picture(&path).unwrap_err();
-        assert!(matches!(&error, PictureError::Colours { .. }), "{error}");
+        assert!(matches!(&error.fault, PictureFault::Colours { .. }), "{error}");
         assert!(error.to_string().contains(what), "{error}");
     }
     // But not where another chunk is believed

@@ -1,4 +1,4 @@
-use noisefloor_image::{Picture, PictureError, read_pfm, read_picture};
+use noisefloor_image::{Picture, PictureFault, read_pfm, read_picture};
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -59,7 +59,7 @@ fn hostile_headers_are_errors() {
         let (_folder, path) = file(&bytes(header, &[0.0; 12], false));
         let error = read_pfm(&path).unwrap_err();
         assert!(
-            matches!(error, PictureError::Broken { .. } | PictureError::Size { .. }),
+            matches!(error.fault, PictureFault::Broken { .. } | PictureFault::Size(_)),
             "{header:?}: {error}"
         );
     }
@@ -67,7 +67,7 @@ fn hostile_headers_are_errors() {
     let (_folder, path) = file(&endless);
     assert!(read_pfm(&path).is_err());
     let (_folder, path) = file(b"P6\n1 1\n255\nabc");
-    assert!(matches!(read_pfm(&path), Err(PictureError::Foreign { .. })));
+    assert!(matches!(read_pfm(&path).unwrap_err().fault, PictureFault::Foreign { .. }));
 
     // Every cut is an error
     let whole = bytes("PF\n2 2\n-1.0\n", &[0.5; 12], false);

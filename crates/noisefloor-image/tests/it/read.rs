@@ -2,7 +2,7 @@ use crate::util::{exr_claiming, exr_header, f32s, make_exr};
 use exr::prelude::{Compression, FlatSamples, IntegerBounds, f16};
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use noisefloor_image::{
-    Picture, PictureError, ReadOptions, read_exr, read_picture, read_picture_with, read_png, read_unread,
+    Picture, PictureFault, ReadOptions, read_exr, read_picture, read_picture_with, read_png, read_unread,
     write_png,
 };
 use std::path::PathBuf;
@@ -100,7 +100,7 @@ fn layers_are_chosen_by_what_they_are_called() {
         write(layers);
         let error = read_exr(&path).unwrap_err();
         assert!(
-            matches!(&error, PictureError::Layers { found, .. } if *found == layers.join(", ")),
+            matches!(&error.fault, PictureFault::Layers(found) if *found == layers.join(", ")),
             "{error}"
         );
         // And by name, each can be had
@@ -136,7 +136,7 @@ fn pointers_and_pages_are_named() {
         std::fs::write(&path, bytes).unwrap();
         for error in [read_exr(&path).unwrap_err(), read_picture(&path).map(drop).unwrap_err()] {
             assert!(
-                matches!(error, PictureError::StandIn { .. }) && error.to_string().contains(want),
+                matches!(error.fault, PictureFault::StandIn(_)) && error.to_string().contains(want),
                 "{error}"
             );
         }
@@ -148,14 +148,14 @@ fn missing_channels_are_named() {
     let (_folder, path) = scratch();
     make_exr(&path, (1, 1), vec![("R", f32s(&[1.0])), ("A", f32s(&[1.0]))], Compression::ZIP16, (0, 0), None);
     let error = read_exr(&path).unwrap_err();
-    assert!(matches!(&error, PictureError::Channels { missing, .. } if missing == "G, B"), "{error}");
+    assert!(matches!(&error.fault, PictureFault::Channels { missing, .. } if missing == "G, B"), "{error}");
     let said = error.to_string();
     assert!(said.contains("a.exr") && said.contains("A, R"), "{said}");
 
     // Coordinates are not luminance
     let xyz = ["X", "Y", "Z"].map(|name| (name, f32s(&[1.0])));
     make_exr(&path, (1, 1), xyz.to_vec(), Compression::ZIP16, (0, 0), None);
-    assert!(matches!(read_exr(&path), Err(PictureError::Channels { .. })));
+    assert!(matches!(read_exr(&path).unwrap_err().fault, PictureFault::Channels { .. }));
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn the_display_window_is_the_picture() {
     assert_eq!(read((-7, 9), IntegerBounds::new((-6, 9), (3, 1))).unwrap(), [2.0, 3.0, 0.0]);
     // Apart
     let error = read((5, 0), IntegerBounds::new((0, 0), (4, 3))).unwrap_err();
-    assert!(matches!(error, PictureError::Unsupported { .. }), "{error}");
+    assert!(matches!(error.fault, PictureFault::Unsupported { .. }), "{error}");
 }
 
 /// Luminance with a quarter of the chroma (OpenEXR, RgbaYca): refused by name, not as broken.
@@ -189,7 +189,7 @@ fn luminance_and_chroma_are_refused_by_name() {
     let (_folder, path) = scratch();
     std::fs::write(&path, exr_header(4, 4, [("BY", 2), ("RY", 2), ("Y", 1)])).unwrap();
     let error = read_exr(&path).unwrap_err();
-    assert!(matches!(error, PictureError::Unsupported { .. }), "{error}");
+    assert!(matches!(error.fault, PictureFault::Unsupported { .. }), "{error}");
     assert!(error.to_string().contains("luminance and chroma (Y, RY, BY)"), "{error}");
 }
 
@@ -234,16 +234,19 @@ fn content_decides_not_the_name() {
     let (folder, path) = scratch();
     write_png(&path, 1, 1, &[255, 255, 255]).unwrap();
     assert!(matches!(read_picture(&path), Ok(Picture::Display(_))));
-    assert!(matches!(read_exr(&path), Err(PictureError::Foreign { found: "a PNG file", .. })));
+    assert!(matches!(read_exr(&path).unwrap_err().fault, PictureFault::Foreign { found: "a PNG file", .. }));
 
     std::fs::write(&path, b"P6 1 1 255 ...").unwrap();
     let said = read_picture(&path).unwrap_err().to_string();
     assert!(said.contains("a.exr") && said.contains("OpenEXR") && said.contains("PNG"), "{said}");
 
     std::fs::write(&path, b"").unwrap();
-    assert!(matches!(read_png(&path), Err(PictureError::Foreign { found: "an empty file", .. })));
-    assert!(matches!(read_picture(folder.path()), Err(PictureError::Foreign { .. })));
-    assert!(matches!(read_picture(folder.path().join("absent")), Err(PictureError::Io { .. })));
+    assert!(matches!(
+        read_png(&path).unwrap_err().fault,
+        PictureFault::Foreign { found: "an empty file", .. }
+    ));
+    assert!(matches!(read_picture(folder.path()).unwrap_err().fault, PictureFault::Foreign { .. }));
+    assert!(matches!(read_picture(folder.path().join("absent")).unwrap_err().fault, PictureFault::Io(_)));
 }
 
 #[test]
@@ -252,13 +255,13 @@ fn sizes_are_checked_before_pixels() {
     for (width, height) in [(70_000, 10), (60_000, 60_000), (i32::MAX, i32::MAX), (0, 5)] {
         std::fs::write(&path, exr_claiming(width, height)).unwrap();
         let error = read_exr(&path).unwrap_err();
-        assert!(matches!(error, PictureError::Size { .. } | PictureError::Broken { .. }), "{error}");
+        assert!(matches!(error.fault, PictureFault::Size(_) | PictureFault::Broken { .. }), "{error}");
     }
     std::fs::write(&path, exr_claiming(70_000, 10)).unwrap();
-    assert!(matches!(read_exr(&path), Err(PictureError::Size { .. })));
+    assert!(matches!(read_exr(&path).unwrap_err().fault, PictureFault::Size(_)));
     // Within the limits, but there is no table of blocks
     std::fs::write(&path, exr_claiming(16_384, 16_384)).unwrap();
-    assert!(matches!(read_exr(&path), Err(PictureError::Broken { .. })));
+    assert!(matches!(read_exr(&path).unwrap_err().fault, PictureFault::Broken { .. }));
 
     // A PNG header is the same for any size: patch width, height and checksum of a small one
     for (width, height) in [(70_000u32, 10u32), (60_000, 60_000), (0, 5), (16_384, 16_384)] {
@@ -271,8 +274,8 @@ fn sizes_are_checked_before_pixels() {
         std::fs::write(&path, bytes).unwrap();
         let error = read_png(&path).unwrap_err();
         let large = width.max(height) == 70_000 || width == 60_000;
-        assert_eq!(matches!(error, PictureError::Size { .. }), large, "{error}");
-        assert!(large || matches!(error, PictureError::Broken { .. }), "{error}");
+        assert_eq!(matches!(error.fault, PictureFault::Size(_)), large, "{error}");
+        assert!(large || matches!(error.fault, PictureFault::Broken { .. }), "{error}");
     }
 }
 

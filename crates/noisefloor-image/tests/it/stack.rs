@@ -1,6 +1,8 @@
 use crate::util::flat_exr;
 use noisefloor::{ProgressiveSource, Request, SourceError, Tile, TileGrid};
-use noisefloor_image::{PictureError, RenderLayers, StackError, StackSource, write_exr, write_png};
+use noisefloor_image::{
+    PictureError, PictureFault, RenderLayers, StackError, StackSource, write_exr, write_png,
+};
 use std::path::Path;
 
 const SIZE: (usize, usize) = (48, 20);
@@ -178,7 +180,8 @@ fn odd_images_are_named_when_they_are_reached() {
         "{error}"
     );
     let error = cause(stack.sample(&[Request::new(tiles()[0], 40, 1)]).unwrap_err());
-    assert!(matches!(error, StackError::Picture(PictureError::Foreign { .. })), "{error}");
+    let foreign = |error: &PictureError| matches!(error.fault, PictureFault::Foreign { .. });
+    assert!(matches!(&error, StackError::Picture(picture) if foreign(picture)), "{error}");
 }
 
 #[test]

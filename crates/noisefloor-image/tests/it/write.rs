@@ -1,5 +1,5 @@
 use noisefloor_image::{
-    Plane, RenderLayers, WriteError, read_exr, read_png, write_atomic, write_exr, write_png,
+    Plane, RenderLayers, WriteFault, read_exr, read_png, write_atomic, write_exr, write_png,
 };
 use std::io::{self, Write};
 
@@ -65,15 +65,18 @@ fn wrong_lengths_are_errors() {
     let path = folder.path().join("a.exr");
     let rgb = [[0.0; 3]; 4];
     assert!(matches!(
-        write_exr(&path, &RenderLayers::rgb(2, 3, &rgb)),
-        Err(WriteError::Size { got: 4, want: 6, .. })
+        write_exr(&path, &RenderLayers::rgb(2, 3, &rgb)).unwrap_err().fault,
+        WriteFault::Size { got: 4, want: 6, .. }
     ));
-    assert!(matches!(write_exr(&path, &RenderLayers::rgb(0, 3, &rgb)), Err(WriteError::Image { .. })));
+    assert!(matches!(
+        write_exr(&path, &RenderLayers::rgb(0, 3, &rgb)).unwrap_err().fault,
+        WriteFault::Image(_)
+    ));
     let layers = RenderLayers { spp: Some([1][..].into()), ..RenderLayers::rgb(2, 2, &rgb) };
-    assert!(matches!(write_exr(&path, &layers), Err(WriteError::Size { what: "spp", .. })));
-    assert!(matches!(write_png(&path, 2, 2, &[0; 4]), Err(WriteError::Size { want: 12, .. })));
-    assert!(matches!(write_png(&path, 0, 2, &[]), Err(WriteError::Png { .. })));
-    assert!(matches!(write_png(&path, 1 << 31, 1, &[]), Err(WriteError::Png { .. })));
+    assert!(matches!(write_exr(&path, &layers).unwrap_err().fault, WriteFault::Size { what: "spp", .. }));
+    assert!(matches!(write_png(&path, 2, 2, &[0; 4]).unwrap_err().fault, WriteFault::Size { want: 12, .. }));
+    assert!(matches!(write_png(&path, 0, 2, &[]).unwrap_err().fault, WriteFault::Png { .. }));
+    assert!(matches!(write_png(&path, 1 << 31, 1, &[]).unwrap_err().fault, WriteFault::Png { .. }));
     assert_eq!(entries(folder.path()), 0);
 }
 
@@ -100,11 +103,14 @@ fn folders_that_cannot_be_written_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("absent").join("a.csv");
     let error = write_atomic(&path, |writer| writer.write_all(b"x")).unwrap_err();
-    assert!(matches!(&error, WriteError::Folder { folder, .. } if folder.ends_with("absent")), "{error}");
+    assert!(
+        matches!(&error.fault, WriteFault::Folder { folder, .. } if folder.ends_with("absent")),
+        "{error}"
+    );
 
     // A folder in the place of the file
     let error = write_atomic(folder.path(), |writer| writer.write_all(b"x")).unwrap_err();
-    assert!(matches!(error, WriteError::NotAFile { .. }), "{error}");
+    assert!(matches!(error.fault, WriteFault::NotAFile), "{error}");
 }
 
 #[cfg(unix)]
@@ -126,5 +132,5 @@ fn links_and_devices_survive() {
     assert_eq!(mode(&file), mode(&plain));
 
     let device = std::path::Path::new("/dev/null");
-    assert!(matches!(write_atomic(device, |w| w.write_all(b"x")), Err(WriteError::NotAFile { .. })));
+    assert!(matches!(write_atomic(device, |w| w.write_all(b"x")).unwrap_err().fault, WriteFault::NotAFile));
 }
