@@ -4,11 +4,10 @@
     pip install cvvdp pillow scipy OpenEXR
     look.py people FOLDER-WITH-lisic9-AND-lisic-two     what the worst places of zones had lost where people stopped
     look.py picture STOPPED REFERENCE                   the same of a picture
-    look.py pairs STOPPED REFERENCE OUT                 twenty blind pairs; answer before you open OUT/key.json
 
 STOPPED and REFERENCE are folders of `noisefloor render`, with different seeds. Both are shown at the exposure
-of the reference. The difference is scaled by sqrt(N / (N + n)) for the noise of the reference, except in pairs."""
-import csv, json, math, pathlib, random, secrets, sys
+of the reference. The difference is scaled by sqrt(N / (N + n)) for the noise of the reference."""
+import csv, json, math, pathlib, sys
 import numpy as np, torch
 from PIL import Image
 from scipy.ndimage import uniform_filter
@@ -119,40 +118,11 @@ def picture(stopped, reference):
         print(f"| {'scaled' if scaled else 'as it is'} | {worst:.2f} | {narrow.max():.2f} |")
 
 
-def pairs(stopped, reference, out):
-    test, truth = pictures(stopped, reference, False)
-    h, w = truth.shape[:2]
-    noisy, seed, places = contrast(test, truth, 28), secrets.randbits(64), []
-    chance = random.Random(seed)
-    # The ten worst places, apart by 32 pixels or more, and ten more anywhere
-    for i in np.argsort(-noisy, axis=None):
-        y, x = (int(v) for v in np.unravel_index(i, noisy.shape))
-        x, y = min(max(x - 32, 0), w - 64), min(max(y - 32, 0), h - 64)
-        if all(max(abs(x - a), abs(y - b)) >= 32 for a, b in places):
-            places.append((x, y))
-        if len(places) == 10:
-            break
-    places += [(chance.randrange(w - 63), chance.randrange(h - 63)) for _ in range(10)]
-    chance.shuffle(places)
-    out.mkdir(parents=True, exist_ok=True)
-    key = []
-    for i, (x, y) in enumerate(places, 1):
-        canvas, left = Image.new("RGB", (320, 160), (118, 118, 118)), chance.random() < 0.5
-        for picture, at in ((test, 64 if left else 192), (truth, 192 if left else 64)):
-            part = np.round(picture[y:y + 64, x:x + 64] * 255).astype(np.uint8)
-            canvas.paste(Image.fromarray(part), (at, 48))
-        canvas.save(out / f"pair{i:02}.png")
-        key.append(dict(pair=i, x=x, y=y, noisy="left" if left else "right"))
-    (out / "key.json").write_text(json.dumps(dict(seed=seed, key=key)))
-
-
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["people", root]:
             people(pathlib.Path(root))
         case ["picture", stopped, reference]:
             picture(stopped, reference)
-        case ["pairs", stopped, reference, out]:
-            pairs(stopped, reference, pathlib.Path(out))
         case _:
             sys.exit(__doc__)

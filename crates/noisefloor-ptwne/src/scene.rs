@@ -178,11 +178,6 @@ impl Scene {
             || matches!(&self.sky, Some(Sky::Dome(dome)) if !dome.is_black())
     }
 
-    /// Number of lights that are never sampled, since they are black or face away from the whole scene.
-    pub fn idle_lights(&self) -> usize {
-        self.lights.all.iter().filter(|l| l.power_pmf <= 0.0).count()
-    }
-
     /// Whether any surface is partly transparent or has no back
     /// ([`MaterialOptions::opacity`](crate::MaterialOptions::opacity) and `culled`), so that rays must test
     /// it. Other scenes are rendered by code without that test.

@@ -11,20 +11,16 @@ pub(crate) const RESOLUTIONS: RangeInclusive<f64> = 1.0..=1000.0;
 #[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum MetricError {
-    /// The size is out of range.
     #[error(transparent)]
     Size(#[from] TileError),
-    /// The number of pixels does not match the size.
     #[error("a picture of {width}×{height} pixels needs {expected} values, not {got}")]
     Pixels { width: usize, height: usize, expected: usize, got: usize },
     #[error("pictures of {0:?} and {1:?} pixels (width, height) cannot be compared; use the same size")]
     Differ((usize, usize), (usize, usize)),
-    /// The pictures are too small for a metric.
     #[error("{metric} needs pictures of at least {least}×{least} pixels, not {width}×{height}")]
     Small { metric: &'static str, least: usize, width: usize, height: usize },
     #[error("{metric} refused the pictures: {why}")]
     Refused { metric: &'static str, why: String },
-    /// A pixel is not finite.
     #[error(
         "pixel ({x}, {y}) of the {picture} is not finite; repair the render or paint over the pixel first"
     )]
@@ -36,7 +32,6 @@ pub enum MetricError {
     },
     #[error("ColorVideoVDP: {0}")]
     Vision(#[from] VisionError),
-    /// The resolution of the viewing condition is out of range.
     #[error(
         "the resolution must be {least} to {most} pixels per degree of the visual field, not {0}",
         least = RESOLUTIONS.start(),

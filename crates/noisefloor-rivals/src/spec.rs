@@ -145,7 +145,6 @@ pub const RIVALS: &[Rival] = &[
 pub enum SpecError {
     #[error("there is no criterion {name:?}; there are {}", known())]
     Unknown { name: String },
-    /// Not a number, or one that the criterion cannot take.
     #[error("{spec:?}: {name} takes {wanted}, as in {name}:{example}")]
     Number {
         spec: String,

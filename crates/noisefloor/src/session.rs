@@ -789,11 +789,6 @@ impl<C: StoppingCriterion> Session<C> {
             },
         )
     }
-
-    /// Takes the session apart: the film, and the display if it has settled.
-    pub fn into_film(self) -> (Film, Option<Display>) {
-        (self.film, self.display)
-    }
 }
 
 /// What a criterion looks at; none before the display is settled.
