@@ -190,32 +190,6 @@ fn limits_have_their_reasons() {
         }
     }
     assert!(limited.samples().contains(&150));
-
-    // Cancelled after the first batch: what is there stays
-    let mut driver = Driver::new(cornell(), Oracle::bundled(), small_tiles()).unwrap();
-    let flag = driver.cancel_flag();
-    driver
-        .run(|_, event| {
-            if matches!(event, Event::BatchDone(_)) {
-                flag.store(true, Ordering::Relaxed);
-            }
-        })
-        .unwrap();
-    let outcome = Outcome::of(driver.session());
-    assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Cancelled && s.spp == 8), "{outcome:?}");
-    assert!(outcome.image.iter().flatten().any(|&c| c > 0.0));
-}
-
-#[test]
-fn a_stack_that_ends_says_so() {
-    let stops = run(
-        Synthetic { store: 130, noise: |_, _| 3.0, ..Synthetic::new(96, 32) },
-        Oracle::bundled(),
-        small_tiles(),
-    );
-    for stop in stops.stops {
-        assert_eq!((stop.spp, stop.reason), (130, StopReason::SourceExhausted));
-    }
 }
 
 #[test]

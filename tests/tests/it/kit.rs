@@ -16,8 +16,6 @@ pub(crate) struct Synthetic {
     pub(crate) radiance: fn(usize, usize) -> f32,
     /// Relative standard deviation of one sample, 0…1.
     pub(crate) noise: fn(usize, usize) -> f32,
-    /// Factor on all radiance.
-    pub(crate) brightness: f32,
     /// Samples per pixel that it has.
     pub(crate) store: u64,
     pub(crate) aims: bool,
@@ -37,7 +35,6 @@ impl Synthetic {
             seed: 1,
             radiance,
             noise,
-            brightness: 1.0,
             store: u64::MAX,
             aims: true,
             repeats: Repeats::Samples,
@@ -52,7 +49,7 @@ impl Synthetic {
     }
 
     fn mean(&self, x: usize, y: usize, first: u64, samples: u64) -> Rgb {
-        let (radiance, noise) = ((self.radiance)(x, y) * self.brightness, f64::from((self.noise)(x, y)));
+        let (radiance, noise) = ((self.radiance)(x, y), f64::from((self.noise)(x, y)));
         let bright = self.bright((y * self.size.0 + x) as u64, first, first + samples);
         let factor = 1.0 + noise * (2.0 * f64::from(bright) / samples as f64 - 1.0);
         [1.0, 0.8, 0.5].map(|c| c * radiance * factor as f32)

@@ -23,15 +23,14 @@ fn image(pass: u64, spp: u64, channels: usize) -> Vec<f32> {
 fn begin(session: &Handle, waiting: usize, when_full: u32) -> *mut NfBackground {
     let mut background = null_mut();
     // SAFETY: a living handle, and a pointer to a variable of this function.
-    let status = unsafe { nf_background_begin(session.0, waiting, when_full, &mut background) };
-    assert_eq!(status, NfStatus::Ok, "{}", message());
+    ok(unsafe { nf_background_begin(session.0, waiting, when_full, &mut background) });
     background
 }
 
 fn state(background: *const NfBackground) -> NfBackgroundState {
     let mut state = NfBackgroundState::default();
     // SAFETY: a pointer to a variable of this function.
-    assert_eq!(unsafe { nf_background_state(background, &mut state) }, NfStatus::Ok, "{}", message());
+    ok(unsafe { nf_background_state(background, &mut state) });
     state
 }
 
@@ -49,35 +48,31 @@ fn stops_are_those_of_a_session_that_waits() {
     for pass in 0.. {
         let mut spp = 0;
         // SAFETY: a living handle, and a pointer to a variable of this function.
-        assert_eq!(unsafe { nf_session_next_pass(plain.0, &mut spp) }, NfStatus::Ok);
+        ok(unsafe { nf_session_next_pass(plain.0, &mut spp) });
         if spp == 0 {
             break;
         }
         for request in requests(&plain) {
             let mean = render(tile(request.tile), 100 * pass, spp);
             // SAFETY: a living handle, and an array of the size given.
-            let status =
-                unsafe { nf_session_push(plain.0, request.tile.index, spp, mean.as_ptr(), mean.len()) };
-            assert_eq!(status, NfStatus::Ok, "{}", message());
+            ok(unsafe { nf_session_push(plain.0, request.tile.index, spp, mean.as_ptr(), mean.len()) });
         }
         // SAFETY: a living handle, and NULL where it is allowed.
-        assert_eq!(unsafe { nf_session_judge(plain.0, null_mut()) }, NfStatus::Ok, "{}", message());
+        ok(unsafe { nf_session_judge(plain.0, null_mut()) });
         if pass % 3 == 1 {
             for tile in grid().tiles() {
                 let mean = render(tile, 100 * pass, spp);
                 // SAFETY: an array of the size given.
-                let status =
-                    unsafe { nf_background_push(background, tile.index, spp, mean.as_ptr(), mean.len()) };
-                assert_eq!(status, NfStatus::Ok, "{}", message());
+                ok(unsafe { nf_background_push(background, tile.index, spp, mean.as_ptr(), mean.len()) });
             }
         } else {
             let image = image(pass, spp, if pass % 3 == 0 { 3 } else { 4 });
-            assert_eq!(push_image(background, spp, &image), NfStatus::Ok, "{}", message());
+            ok(push_image(background, spp, &image));
         }
-        assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
+        ok(nf_background_judge(background));
         passes += 1;
     }
-    assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
+    ok(nf_background_finish(background));
     let tiles = grid().len();
     let expected = NfBackgroundState {
         judged: passes,
@@ -97,9 +92,9 @@ fn stops_are_those_of_a_session_that_waits() {
     // SAFETY: NULL where it is allowed.
     assert_eq!(unsafe { nf_session_judge(session.0, null_mut()) }, NfStatus::Argument);
     assert!(message().contains("nf_background_end"), "{}", message());
-    assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
+    ok(nf_background_end(background));
     assert_eq!(nf_background_end(background), NfStatus::Handle);
-    assert_eq!(nf_background_end(null_mut()), NfStatus::Ok);
+    ok(nf_background_end(null_mut()));
     assert_eq!(states(&session), states(&plain));
 }
 
@@ -112,12 +107,12 @@ fn faults_and_wrong_calls_are_said() {
     assert_eq!((status, background), (NfStatus::Argument, null_mut()));
     let background = begin(&session, 1, NF_FULL_MERGE);
     assert_eq!(push_image(background, 8, &vec![0.5; 2 * PIXELS]), NfStatus::Argument);
-    assert_eq!(push_image(background, 8, &vec![f32::NAN; 3 * PIXELS]), NfStatus::Ok);
-    assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
+    ok(push_image(background, 8, &vec![f32::NAN; 3 * PIXELS]));
+    ok(nf_background_judge(background));
     assert_eq!(nf_background_finish(background), NfStatus::Fault);
     assert!(message().contains("not finite"), "{}", message());
     assert_eq!(nf_background_judge(background), NfStatus::Fault);
-    assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
+    ok(nf_background_end(background));
     assert_eq!(requests(&session)[0].first, 0);
 }
 
@@ -135,21 +130,20 @@ fn what_is_left_is_said() {
             sums.iter_mut().zip(&new).for_each(|(sum, new)| *sum += spp as f32 * new);
             had += spp;
             let mean: Vec<f32> = sums.iter().map(|sum| sum / had as f32).collect();
-            let status = match running {
+            ok(match running {
                 // SAFETY: an array of the size given.
                 true => unsafe {
                     nf_background_push_running_image(background, had, mean.as_ptr(), mean.len(), 3)
                 },
                 false => push_image(background, spp, &new),
-            };
-            assert_eq!(status, NfStatus::Ok, "{}", message());
-            assert_eq!(nf_background_judge(background), NfStatus::Ok, "{}", message());
+            });
+            ok(nf_background_judge(background));
             assert_eq!(state(background).spp_left, 100 - had, "judged or not");
         }
-        assert_eq!(nf_background_finish(background), NfStatus::Ok, "{}", message());
+        ok(nf_background_finish(background));
         let NfBackgroundState { next_pass, spp_left, open_tiles, .. } = state(background);
         assert_eq!((next_pass, spp_left, open_tiles), (0, 0, 0));
-        assert_eq!(nf_background_end(background), NfStatus::Ok, "{}", message());
+        ok(nf_background_end(background));
         let far = super::image(&session)
             .iter()
             .zip(&sums)

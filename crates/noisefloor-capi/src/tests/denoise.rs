@@ -88,7 +88,7 @@ fn denoised_session(told: &Told, hits: Option<&[Vec<f32>; 4]>) -> Handle {
     let first_hits = pictures.as_ref().map_or(null(), |pictures| pictures.as_ptr());
     let user = std::ptr::from_ref(told).cast_mut().cast();
     // SAFETY: arrays of the sizes given, and a function of the right kind.
-    let status = unsafe {
+    ok(unsafe {
         nf_session_new_denoised(
             WIDTH,
             HEIGHT,
@@ -101,8 +101,7 @@ fn denoised_session(told: &Told, hits: Option<&[Vec<f32>; 4]>) -> Handle {
             &seldom(),
             &mut session,
         )
-    };
-    assert_eq!(status, NfStatus::Ok, "{}", message());
+    });
     Handle(session)
 }
 
@@ -110,7 +109,7 @@ fn jods_lost(session: &Handle) -> Vec<f64> {
     // SAFETY: a living handle, and an array of the size given.
     unsafe {
         let mut lost = vec![0.0; nf_session_tile_count(session.0)];
-        assert_eq!(nf_session_jods_lost(session.0, lost.as_mut_ptr(), lost.len()), NfStatus::Ok);
+        ok(nf_session_jods_lost(session.0, lost.as_mut_ptr(), lost.len()));
         lost
     }
 }
@@ -156,9 +155,8 @@ fn stops_are_those_of_rust_and_go_on_after_a_resume() {
     // SAFETY: living handles, arrays of the sizes given.
     unsafe {
         let (at, room) = (bytes.as_mut_ptr(), bytes.len());
-        let status = nf_session_checkpoint(first.0, c"wall".as_ptr(), at, room, &mut size);
-        assert_eq!(status, NfStatus::Ok, "{}", message());
-        assert_eq!(nf_session_restore(second.0, c"wall".as_ptr(), bytes.as_ptr(), size), NfStatus::Ok);
+        ok(nf_session_checkpoint(first.0, c"wall".as_ptr(), at, room, &mut size));
+        ok(nf_session_restore(second.0, c"wall".as_ptr(), bytes.as_ptr(), size));
     }
     let same = jods_lost(&first).into_iter().zip(jods_lost(&second));
     assert!(same.into_iter().all(|(a, b)| a.to_bits() == b.to_bits()));
@@ -222,8 +220,8 @@ fn what_a_denoiser_does_wrong_is_a_status() {
     let picture = vec![f32::INFINITY; 3 * PIXELS];
     assert_eq!(make(Some(denoise), 0.3, &[picture.as_ptr(); 4], 3 * PIXELS - 3), NfStatus::Size);
     assert_eq!(make(Some(denoise), 0.3, &[picture.as_ptr(); 4], 3 * PIXELS), NfStatus::Argument);
-    assert_eq!(make(Some(denoise), 0.3, &[], 0), NfStatus::Ok);
-    assert_eq!(nf_session_free(session), NfStatus::Ok);
+    ok(make(Some(denoise), 0.3, &[], 0));
+    ok(nf_session_free(session));
 
     let noisy = super::session(&params());
     let mut lost = [0.0; 9];
@@ -253,14 +251,14 @@ fn the_mean_of_mirror_images_is_that_of_rust() {
         }
     };
     let mut made = vec![0.0; 3 * PIXELS];
-    assert_eq!(mean(4, null(), null(), 3 * PIXELS, &mut made), NfStatus::Ok, "{}", message());
+    ok(mean(4, null(), null(), 3 * PIXELS, &mut made));
     assert!(made == expected.as_flattened());
     assert!(told.calls.get() == 4 && told.hits.borrow().is_empty());
 
     // The first pixel that a pass sees is another corner each time
     let plane = |add: usize| -> Vec<f32> { (0..3 * PIXELS).map(|i| (i / 3 + add) as f32).collect() };
     let (albedo, normal) = (plane(0), plane(1000));
-    assert_eq!(mean(4, albedo.as_ptr(), normal.as_ptr(), 3 * PIXELS, &mut made), NfStatus::Ok);
+    ok(mean(4, albedo.as_ptr(), normal.as_ptr(), 3 * PIXELS, &mut made));
     let corners = [0, WIDTH - 1, PIXELS - WIDTH, PIXELS - 1];
     assert_eq!(*told.hits.borrow(), corners.map(|corner| [corner as f32, (corner + 1000) as f32]));
 

@@ -114,9 +114,9 @@ fn record(seed: u64, transcript: &mut Transcript) {
     let (mut oracle, mut session) = (null_mut(), null_mut());
     // SAFETY: pointers to variables of this function, and handles that were just made.
     unsafe {
-        assert_eq!(nf_oracle_bundled(people, &mut oracle), NfStatus::Ok);
+        ok(nf_oracle_bundled(people, &mut oracle));
         let made = nf_session_new(width, height, oracle, &params, &mut session);
-        assert_eq!(made, NfStatus::Ok, "{}", message());
+        ok(made);
         nf_oracle_free(oracle);
     }
     let session = Handle(session);
@@ -150,10 +150,10 @@ fn record(seed: u64, transcript: &mut Transcript) {
                 // SAFETY: as above.
                 unsafe { nf_session_push(session.0, tile.index, spp, mean.as_ptr(), floats) }
             };
-            assert_eq!(status, NfStatus::Ok, "{}", message());
+            ok(status);
         }
         // SAFETY: a living handle, and NULL where it is allowed.
-        assert_eq!(unsafe { nf_session_judge(session.0, null_mut()) }, NfStatus::Ok, "{}", message());
+        ok(unsafe { nf_session_judge(session.0, null_mut()) });
         transcript.words(&[3]);
         transcript.states(&states(&session));
     }

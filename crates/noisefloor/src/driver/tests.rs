@@ -198,7 +198,6 @@ fn a_reference_is_rendered_once_before_any_sample() {
     assert!(ready == 1 && !driver.source.calls.is_empty());
 }
 
-/// The tiles of a picture too large for one call grow together, in calls that are full.
 /// A criterion that fails.
 struct Broken;
 
@@ -249,6 +248,7 @@ fn a_second_run_counts_on() {
     assert!(clock.source_seconds + clock.criterion_seconds <= clock.total_seconds, "{clock:?}");
 }
 
+/// The tiles of a picture too large for one call grow together, in calls that are full.
 #[test]
 fn large_pictures_take_turns() {
     let grid = crate::TileGrid::new(7680, 4320, 512).unwrap();

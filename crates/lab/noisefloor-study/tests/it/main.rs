@@ -1,5 +1,5 @@
 //! Tests of noisefloor-study, one module a subject.
-#![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by a panic, and may print")]
 
 mod api; // requests that are refused, and what they leave behind: nothing
 mod browser; // the pages in a real browser
