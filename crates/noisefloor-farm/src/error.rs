@@ -21,14 +21,12 @@ pub(crate) const PLAN_VERSION: u64 = 5;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ShardError {
-    /// The operating system could not read it.
     #[error("it cannot be read: {0}")]
     Io(#[from] io::Error),
     #[error("it is not a shard: its first bytes are not those of one")]
     Foreign,
     #[error("it has format version {0}, and this release reads version {VERSION}: render it again")]
     Version(u32),
-    /// The content is not what was written.
     #[error("it is damaged: {0}")]
     Damaged(String),
     #[error("it belongs to another job: its {what} is {kept}, not {now}")]
@@ -38,10 +36,8 @@ pub enum ShardError {
         kept: String,
         now: String,
     },
-    /// Its samples are of another scene, or of other options.
     #[error("it belongs to another job: {0}")]
     Changed(#[from] IdentityChange),
-    /// A picture or tile size out of range.
     #[error(transparent)]
     Tile(#[from] TileError),
 }
@@ -67,13 +63,10 @@ pub type StudioError = Box<dyn Error + Send + Sync>;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FarmError {
-    /// A file of the folder cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
     Read { path: PathBuf, source: io::Error },
-    /// A file of the folder has another content than it should have.
     #[error("{}: is not what a farm writes: {source}; plan the farm anew in another folder", path.display())]
     Json { path: PathBuf, source: serde_json::Error },
-    /// A file of the folder cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error(
@@ -89,7 +82,6 @@ pub enum FarmError {
         /// What is wrong, and what to do.
         what: String,
     },
-    /// Another coordinator works in the folder.
     #[error(
         "{}: another noisefloor plans or merges in this folder; wait for it, or see `noisefloor farm status`",
         .0.display()
@@ -100,7 +92,6 @@ pub enum FarmError {
          `noisefloor render` renders it on one machine"
     )]
     Repeats(String),
-    /// A batch that no plan asks for.
     #[error(
         "the plan asks for {spp} samples of tile {tile} from sample {first} on, which no plan of a farm does: \
          it is damaged; plan the farm anew in another folder"
@@ -121,7 +112,6 @@ pub enum FarmError {
         "the frame is not the one that was planned: {0}; restore it, or plan the farm anew in another folder"
     )]
     Edited(ShardError),
-    /// A program could not be run, or refused.
     #[error("`{program}` {what}")]
     Program {
         program: String,
@@ -152,30 +142,23 @@ pub enum FarmError {
         /// What the first task of the last one said.
         log: PathBuf,
     },
-    /// A step whose round is over.
     #[error("round {number} has been superseded by round {now}: nothing to do")]
     Superseded { number: usize, now: usize },
-    /// A task whose round is over, or that it never had.
     #[error("{}: round {number} has no task {task} (any more): nothing to do", path.display())]
     NoTask { path: PathBuf, number: usize, task: usize },
-    /// The folder of a frame has a picture that is not the farm's.
     #[error(
         "{}: holds a picture of another job than the farm's; move it away, or plan the farm in another folder",
         .0.display()
     )]
     OtherPicture(PathBuf),
-    /// The criterion cannot be judged by from shards.
     #[error(
         "this model needs a reference, which a farm does not render; use a model trained on half buffers"
     )]
     Reference,
-    /// The checkpoint of a frame does not continue its session.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// Shards without the render that they are of.
     #[error("{}: does not say which render it is of: {source}; render it again", path.display())]
     Unknown { path: PathBuf, source: serde_json::Error },
-    /// None of the files is a shard.
     #[error("none of these files is a shard; {}: {source}", path.display())]
     NoShard { path: PathBuf, source: ShardError },
     #[error(transparent)]

@@ -7,14 +7,12 @@ use thiserror::Error;
 /// Why a page cannot be shown.
 #[derive(Debug, Error)]
 pub enum PagesError {
-    /// The server cannot listen on an address.
     #[error("cannot listen on {address}: {source}; choose another port with --port")]
     Listen {
         address: String,
         /// The error of the operating system.
         source: io::Error,
     },
-    /// A language file, or the folder of them, cannot be read.
     #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
     Io {
         path: PathBuf,

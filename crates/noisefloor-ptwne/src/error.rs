@@ -9,7 +9,6 @@ use thiserror::Error;
 pub enum SceneError {
     #[error("{what} is not finite; every coordinate, colour and size must be")]
     NotFinite { what: &'static str },
-    /// A number is outside its range.
     #[error("{what} is {value}, outside {range}")]
     Range {
         what: &'static str,
@@ -17,10 +16,8 @@ pub enum SceneError {
         /// The range it must lie in, as text.
         range: &'static str,
     },
-    /// An index of a mesh points past its last vertex.
     #[error("a mesh with {vertices} vertices has the index {index}")]
     Index { index: u32, vertices: usize },
-    /// The number of normals or texture coordinates differs from that of positions.
     #[error("a mesh with {positions} positions has {found} {what}; give none, or one per position")]
     Lengths {
         /// What there are too many or too few of.
@@ -28,36 +25,28 @@ pub enum SceneError {
         positions: usize,
         found: usize,
     },
-    /// An emitter has no area, and thus no power.
     #[error("an emitter has no area")]
     EmptyEmitter,
-    /// A material is of another builder.
     #[error("material {0} does not exist in this builder")]
     Material(u32),
-    /// The number of pixels of an image does not match its size, or is zero or too large.
     #[error("an image of {width}×{height} pixels has {found} values")]
     Image { width: usize, height: usize, found: usize },
-    /// The camera has no orientation: eye and target coincide, or its up vector is parallel to the view.
     #[error("the camera has no orientation: eye and target coincide, or up is parallel to the view")]
     Camera,
-    /// The axes of an environment map are not those of a rotation.
     #[error("the axes of an environment map must have length 1 and be perpendicular to each other")]
     Rotation,
     /// Objects and instances do not fit together.
     #[error("{0}; objects hold surfaces that do not shine, and are shown by instances in the scene")]
     Object(&'static str),
-    /// The matrix of an instance flattens it, or is too near to one that does for 32-bit numbers.
     #[error(
         "the matrix of an instance is singular: scale no axis by zero, nor one 10⁶ times as much as another"
     )]
     Singular,
-    /// The memory that is allowed is too little.
     #[error("there is no memory for {bytes} bytes more; allow more (`ulimit -v`), or simplify the scene")]
     Memory {
         /// Bytes that were asked for.
         bytes: usize,
     },
-    /// The scene has more of something than the limit allows.
     #[error("the scene has {found} {what}, more than {limit}")]
     TooLarge {
         /// What there are too many of.
@@ -71,10 +60,8 @@ pub enum SceneError {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// The image is empty or too large.
     #[error(transparent)]
     Size(#[from] noisefloor::tile::TileError),
-    /// An option is outside its range.
     #[error("option `{name}` is {value}; it must be {range}")]
     Option {
         name: &'static str,
@@ -82,12 +69,10 @@ pub enum RenderError {
         /// The range it must lie in, as text.
         range: &'static str,
     },
-    /// The clamp is not a positive, finite radiance.
     #[error("option `clamp` is {0}; it must be a radiance above 0")]
     Clamp(f32),
     #[error("threads could not be started")]
     Threads(#[source] Box<dyn StdError + Send + Sync>),
-    /// The watcher of the reference cancelled it.
     #[error("the reference was cancelled")]
     Cancelled,
 }

@@ -145,13 +145,10 @@ fn group(all: impl Iterator<Item = (Treatment, String, Option<Place>)>) -> Vec<F
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// The extension is not one of a scene file.
     #[error("{} is not a scene file: its name must end in .gltf, .glb, .pbrt or .xml", path.display())]
     Format { path: PathBuf },
-    /// This build has no readers.
     #[error("{}: this build reads no scene files: run `cargo run --release --features formats -- render …`", path.display())]
     LeftOut { path: PathBuf },
-    /// A file cannot be opened or read.
     #[error("{place} cannot be read")]
     Read {
         /// The file, or where it is named.
@@ -166,13 +163,10 @@ pub enum LoadError {
         /// What is wrong, and what is expected.
         what: String,
     },
-    /// A file asks for something that is not supported and cannot be left out.
     #[error("{place}: {what} is not supported")]
     Unsupported { place: Place, what: String },
-    /// A file names a file outside its own folder.
     #[error("{place}: `{name}` lies outside the folder of the scene; allow a folder by `--scene-root DIR`")]
     Outside { place: Place, name: String },
-    /// Something is larger than the limit.
     #[error("{place}: {found} {what}, more than {limit}")]
     TooLarge {
         place: Place,
@@ -181,14 +175,12 @@ pub enum LoadError {
         found: u64,
         limit: u64,
     },
-    /// The renderer does not take a part of the scene.
     #[error("{place}")]
     Scene {
         place: Place,
         #[source]
         cause: SceneError,
     },
-    /// More than one thing is wrong.
     #[error("{}", several(.0))]
     Several(Vec<LoadError>),
 }

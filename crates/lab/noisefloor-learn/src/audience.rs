@@ -28,10 +28,8 @@ pub struct AudienceFit {
 
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
 pub enum AudienceFitError {
-    /// Too few or too many pairs.
     #[error("a line needs {MIN_PAIRS} to {MAX_PAIRS} pairs of thresholds; there are {0}")]
     Pairs(usize),
-    /// A threshold that cannot be one.
     #[error(
         "thresholds are numbers of samples per pixel, 10⁻⁶ to 10¹⁵; pair {pair} is ({observers}, {audience})"
     )]

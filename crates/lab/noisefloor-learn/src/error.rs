@@ -8,12 +8,10 @@ use thiserror::Error;
 pub enum TableError {
     #[error(transparent)]
     Corpus(#[from] CorpusError),
-    /// A zone has too few images.
     #[error(
         "{scene}, zone {zone}: {images} images are too few; two independent sets of samples and a converged picture are needed"
     )]
     TooFew { scene: String, zone: u32, images: usize },
-    /// The reference has another size than the images.
     #[error("{scene}, zone {zone}: reference.exr has not the size of the full picture")]
     Reference { scene: String, zone: u32 },
     /// The descriptor is for tiles of another size.
@@ -25,7 +23,6 @@ pub enum TableError {
         line: u64,
         what: String,
     },
-    /// The CSV cannot be read or written.
     #[error("the table cannot be read or written: {0}")]
     Csv(#[from] csv::Error),
 }

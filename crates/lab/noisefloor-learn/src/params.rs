@@ -70,7 +70,6 @@ impl TrainParams {
 pub enum TrainError {
     #[error(transparent)]
     Svm(#[from] SvmTrainError),
-    /// All examples are noisy, or all are converged.
     #[error(
         "all {examples} examples{} are {}, and training needs both: \
          check that every threshold lies between the first and the last level of its zone, \
@@ -84,7 +83,6 @@ pub enum TrainError {
         examples: usize,
         converged: bool,
     },
-    /// What people said has nothing to do with what was measured of the noise.
     #[error(
         "what people said does not follow the noise: in {} of {of} groups of scenes ({}), \
          what was learned from the others does not tell noisy examples from converged ones; \
@@ -100,7 +98,6 @@ pub enum TrainError {
     },
     #[error("training needs candidates for C and γ, a range above 1 and a spread above 0")]
     Params,
-    /// Answers that are not described as the zones are.
     #[error("an answer has {found} numbers, and the zones have {expected}: it is of another descriptor")]
     Answer { expected: usize, found: usize },
     #[error("leaving scenes out needs at least {needed} groups of scenes; the corpus has {found}: {names}")]

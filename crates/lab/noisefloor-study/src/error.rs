@@ -12,7 +12,6 @@ use thiserror::Error;
 /// Why a study cannot be run as its file asks.
 #[derive(Debug, Error)]
 pub enum StudyError {
-    /// The study file cannot be read.
     #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
     Io {
         path: PathBuf,
@@ -25,10 +24,8 @@ pub enum StudyError {
         /// What is wrong, with the line number if known.
         what: String,
     },
-    /// A stack has too few or too many pictures.
     #[error("stack {name}: {levels} pictures named by their samples per pixel; a stack needs 2 to {max}")]
     Levels { name: String, levels: usize, max: usize },
-    /// A picture differs in size from its stack.
     #[error(
         "{}: {got:?} pixels, but the most converged picture of the stack has {want:?}; \
          render it again at that size",
@@ -40,23 +37,19 @@ pub enum StudyError {
         got: (usize, usize),
         want: (usize, usize),
     },
-    /// A picture has pixels that are not finite.
     #[error("{}: has pixels that are not finite; fix the render", path.display())]
     NotFinite { path: PathBuf },
     /// A picture cannot be cut into tiles.
     #[error("stack {name}: {source}")]
     Tile { name: String, source: TileError },
-    /// A folder does not hold a stack.
     #[error(transparent)]
     Stack(#[from] StackError),
     #[error(transparent)]
     Picture(#[from] PictureError),
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The answers cannot be read or stored.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The server cannot listen on an address, or a language file is invalid.
     #[error(transparent)]
     Pages(#[from] PagesError),
     #[error("{0}")]
@@ -76,30 +69,24 @@ pub enum StoreError {
         path.display()
     )]
     Database { path: PathBuf, source: rusqlite::Error },
-    /// The database holds the answers to another study.
     #[error(
         "{}: holds answers to another study, or to an earlier design of this one; \
          name another `database` in the study file",
         path.display()
     )]
     OtherStudy { path: PathBuf },
-    /// The database does not hold disagreements.
     #[error("{}: is not a database of `noisefloor-lab explore`; name another with --database", path.display())]
     NotDisagreements { path: PathBuf },
     #[error("no session has the code {0}; check it, or begin a new session")]
     Unknown(String),
-    /// The one-time link does not exist.
     #[error("no participant was invited by this link; check that it was copied in full")]
     NoLink,
-    /// A different event already has this number.
     #[error("event {seq} of session {code} already exists with other content; reload the session")]
     Conflict { code: String, seq: u64 },
     #[error("answers can no longer be stored because the database thread has ended; restart the server")]
     Closed,
-    /// The stored trials of a session are not of the study.
     #[error("the trials stored for session {code} do not fit the study; was the database edited by hand?")]
     Plan { code: String },
-    /// An event in the database does not fit the study.
     #[error("event {seq} of session {code} does not fit the study: {what}; was the database edited by hand?")]
     Event { code: String, seq: u64, what: String },
 }

@@ -72,7 +72,6 @@ pub struct Factor {
 /// Why nothing is saved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationRefusal {
-    /// Easy trials were missed.
     #[error(
         "{missed} of {of} pictures with strong noise were missed, as by guessing; nothing is saved; \
          calibrate again when you have time"

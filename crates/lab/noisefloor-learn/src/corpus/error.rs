@@ -14,7 +14,6 @@ pub enum CorpusError {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// A line of `thresholds.csv` is malformed.
     #[error("{}, line {line}: {what}; the columns are scene,renderer,zone,x,y,width,height,human_spp,first_spp,last_spp", path.display())]
     Row {
         path: PathBuf,
@@ -32,17 +31,14 @@ pub enum CorpusError {
         /// Where batches of the zone would be.
         of_zone: PathBuf,
     },
-    /// Several scenes share one set of zone folders.
     #[error("{}: zone folders hold one scene, but thresholds.csv names {one} and {other}; give each a folder of its own", dir.display())]
     Scenes { dir: PathBuf, one: String, other: String },
-    /// The corpus has no such scene.
     #[error("no scene {scene} in this corpus; it has {known}")]
     Unknown {
         scene: String,
         /// The scenes there are, comma-separated.
         known: String,
     },
-    /// A zone is not inside its image.
     #[error("{}: zone {zone} of {scene} is not inside the {width}×{height} image; correct thresholds.csv", path.display())]
     Zone {
         path: PathBuf,
@@ -53,7 +49,6 @@ pub enum CorpusError {
         /// The image's height in pixels.
         height: usize,
     },
-    /// The stack of a scene or zone is not sound.
     #[error(transparent)]
     Stack(#[from] StackError),
 }

@@ -12,17 +12,14 @@ use thiserror::Error;
 /// Why a simulated observer could not continue.
 #[derive(Debug, Error)]
 pub enum DriveError {
-    /// The server did not answer.
     #[error("{url}: no answer: {source}; is `noisefloor-lab study serve` running there?")]
     Http { url: String, source: Box<ureq::Error> },
     #[error("{url}: refused with status {status}: {body}")]
     Refused { url: String, status: u16, body: String },
-    /// The study does not accept the viewing conditions of simulated observers.
     #[error(
         "simulated observers sit 600 mm from a screen of 96 dpi in a dim room; [viewing] does not allow it"
     )]
     Outside,
-    /// The reply is not valid for this version.
     #[error("{url}: not the JSON expected: {source}; is the server of the same version?")]
     Json { url: String, source: serde_json::Error },
 }
