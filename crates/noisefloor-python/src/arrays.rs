@@ -86,9 +86,7 @@ const AT_ONCE: usize = 1 << 18;
 /// What the values of a picture are.
 #[derive(Clone, Copy)]
 pub(crate) enum Encoding {
-    /// Linear radiance.
     Linear,
-    /// What screens show.
     Srgb,
 }
 

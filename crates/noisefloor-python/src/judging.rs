@@ -14,7 +14,6 @@ use pyo3::types::PyTuple;
 use std::cell::Cell;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Any criterion.
 pub(crate) type Criterion = Box<dyn StoppingCriterion + Send>;
 
 /// What a criterion is made from, again and again: a session that is resumed gets a new one.

@@ -20,7 +20,6 @@ pub(crate) struct PyMetrics {
     scores: MetricScores,
     /// JODs lost.
     cvvdp: DifferenceMap,
-    /// FLIP.
     flip: Option<DifferenceMap>,
 }
 
