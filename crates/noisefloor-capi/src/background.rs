@@ -21,7 +21,6 @@ pub struct NfBackground {
     heard: Mutex<Heard>,
 }
 
-/// What has come so far.
 #[derive(Default)]
 struct Heard {
     judged: u64,

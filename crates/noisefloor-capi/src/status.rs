@@ -44,7 +44,6 @@ pub enum NfStatus {
     Handle = 13,
 }
 
-/// Why a call fails.
 pub(crate) struct Failure {
     pub(crate) status: NfStatus,
     pub(crate) message: String,
@@ -110,7 +109,6 @@ pub(crate) fn set_last_warnings(warnings: &[String]) {
     LAST_WARNINGS.with(|last| *last.borrow_mut() = lines);
 }
 
-/// What a panic says.
 fn words(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no words")

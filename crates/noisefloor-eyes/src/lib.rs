@@ -35,7 +35,6 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Version of the file's format.
 const VERSION: u32 = 1;
 /// Longest file, in bytes.
 const MAX_FILE: u64 = 1 << 20;

@@ -47,7 +47,6 @@ pub(crate) struct Opened {
     pub(crate) reader: BufReader<File>,
     pub(crate) bytes: u64,
     pub(crate) format: Format,
-    /// Most pixels that are decoded.
     pub(crate) most_pixels: usize,
     /// The layer of an EXR that is asked for.
     pub(crate) layer: Option<String>,

@@ -203,7 +203,6 @@ impl ProgressiveSource for CommandSource {
     }
 }
 
-/// The pixels of a tile.
 fn cut(image: &LinearImage, tile: &Tile) -> Vec<noisefloor::Rgb> {
     tile.rows(image.width).flat_map(|row| image.pixels[row].iter().copied()).collect()
 }

@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 
 /// How much of a file is searched for names of other files, in bytes.
 const SEARCHED: u64 = 64 << 20;
-/// Most files.
 const MOST_FILES: usize = 10_000;
 /// Longest name of a file that is looked for, in bytes.
 const LONGEST: usize = 1024;

@@ -6,7 +6,6 @@ use thiserror::Error;
 /// Longest header in bytes, either way.
 pub(crate) const MAX_HEADER: usize = 1 << 20;
 
-/// A reply as it came.
 #[derive(Debug)]
 pub(crate) struct Frame {
     /// Bytes that should be a JSON object.

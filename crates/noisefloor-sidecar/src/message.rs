@@ -4,7 +4,6 @@ use noisefloor::{Repeats, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Version of the protocol.
 pub(crate) const PROTOCOL: u32 = 1;
 
 #[derive(Serialize)]

@@ -54,7 +54,6 @@ impl Template {
         &self.words[0]
     }
 
-    /// Whether it contains a placeholder.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.words.iter().flat_map(|word| placeholders(word)).any(|placeholder| placeholder == name)
     }

@@ -388,7 +388,6 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
 }
 
 impl<C> Background<C> {
-    /// Ends the thread.
     fn end(&self) {
         self.shared.state().ending = true;
         self.shared.changed.notify_all();
@@ -429,7 +428,6 @@ impl<C> Shared<C> {
 }
 
 impl<C: StoppingCriterion + Send> Shared<C> {
-    /// What the thread does.
     fn work(&self, run: impl Fn(&mut (dyn FnMut() + Send))) {
         loop {
             let mut state = self.wait_while(self.state(), |state| state.waiting.is_empty() && !state.ending);
@@ -508,7 +506,6 @@ impl<C: StoppingCriterion + Send> Shared<C> {
     }
 }
 
-/// What came of a pass.
 struct Found {
     stops: Vec<Stop>,
     warnings: Vec<Warning>,
@@ -600,7 +597,6 @@ fn merge(before: &mut Pass, pass: Pass) -> Vec<Vec<Rgb>> {
     spent
 }
 
-/// What a panic said.
 fn said(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a word")

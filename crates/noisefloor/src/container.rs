@@ -110,7 +110,6 @@ impl Format {
         Ok(payload)
     }
 
-    /// Writes a file.
     pub(crate) fn write(&self, content: &impl Serialize, mut to: impl Write) -> Result<(), FileFault> {
         let payload = payload(content)?;
         if payload.len() as u64 > MAX_PAYLOAD {

@@ -14,7 +14,6 @@ mod windows;
 pub use kind::{Described, Descriptor, DescriptorError, DescriptorKind, DescriptorSpec, TileDescriptor};
 pub use mask::{NoiseMask, SigmaError};
 
-/// The built-in descriptors.
 const KINDS: [DescriptorKind; 1] = [visible::KIND];
 
 impl Descriptor {

@@ -109,7 +109,6 @@ struct HalfBand<'a> {
     rejected: &'a [u32],
 }
 
-/// New samples of one tile.
 #[derive(Clone, Copy)]
 struct TileBatch<'a> {
     tile: Tile,

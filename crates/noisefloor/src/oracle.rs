@@ -61,7 +61,6 @@ struct LastDescribed {
     lacked: Option<f64>,
 }
 
-/// What is found of tiles.
 pub(crate) struct Judged {
     /// One for each tile asked about, with whether it is all that the audience asks for.
     pub verdicts: Vec<(Verdict, bool)>,

@@ -87,7 +87,6 @@ impl<'a> TilePixels<'a> {
         Self { pixels: &image[y * stride + x..], stride, width, height }
     }
 
-    /// A row of the tile.
     #[inline]
     pub(crate) fn row(self, y: usize) -> &'a [Rgb] {
         &self.pixels[y * self.stride..][..self.width]

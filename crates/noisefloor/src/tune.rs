@@ -523,7 +523,6 @@ impl PicturePair {
     }
 }
 
-/// A setting that was tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
     /// One picture with this setting would be as good as the mean of the two, if noise follows the setting.
@@ -540,7 +539,6 @@ impl Step {
     }
 }
 
-/// What to do next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Next {
     /// As [`Look`] has them.

@@ -94,7 +94,6 @@ use values::Values;
 /// Groups of a tile of which each is watched; then every fourth.
 const DENSE: u64 = 4;
 
-/// Watches what one session gets.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(crate) struct Watch {
