@@ -21,9 +21,10 @@ import numpy as np
 LIMIT, LEAST, DECAY = 0.3, 1e-3, 0.38
 # Tiles whose reference has itself lost as much are left out
 NOISY_REFERENCE = 0.1
-# The rule: power, step, medians that the hardest counts as at most, margin from 16 tiles on, the least that an estimate counts as, and
-# the powers of an estimate, of earlier ones, and of those around it; and the margin of each tile to the limit
-TOGETHER, STEP, MEDIANS, MARGIN, FLOOR, BEFORE = 0.85, 1.2, 8, 1.2, 1 / 4, 1.5
+# The rule: power, step, medians that the hardest counts as at most, margin from 16 tiles on, the least that an estimate counts as, how
+# near a need has to be that is not looked at a third time, and the powers of an estimate, of earlier ones, and of those around it; and
+# the margin of each tile to the limit
+TOGETHER, STEP, MEDIANS, MARGIN, FLOOR, FORESEEN, BEFORE = 0.85, 1.2, 8, 1.2, 1 / 4, 2, 1.5
 OWN, EARLIER, AROUND = 0.4, 0.3, 0.3
 # The schedule: samples that counts are multiples of, and how much they grow at the least and at the most
 GRID, GROWS = 16, (1.5, 4)
@@ -224,11 +225,11 @@ def play(picture, first=16, margin=MARGIN, power=TOGETHER, powers=(OWN, EARLIER,
     last, tiles = len(spp) - 1, np.arange(len(picture.reference))
     said = np.log(np.maximum(GAIN * picture.estimate, FLOOR * LIMIT / MARGIN)) + DECAY * np.log(picture.spp)[:, None]
     at_one, undenoised = np.full(len(tiles), np.nan), np.zeros(len(tiles), bool)
-    levels, need, looked, verdicts = np.full(len(tiles), np.searchsorted(spp, first)), np.full(len(tiles), -1), tiles, 0
+    levels, need, looked, verdicts = np.full(len(tiles), np.searchsorted(spp, first)), np.full(len(tiles), -1.0), tiles, 0
     while True:
         looked = np.array([i for i in looked if need[i] < 0 and levels[i] < last], int)
         verdicts += len(looked) > 0
-        new = said[levels[looked], looked]
+        before, new = ~np.isnan(at_one), said[levels[looked], looked]
         at_one[looked] = np.where(np.isnan(at_one[looked]), new, (own * new + earlier * at_one[looked]) / (own + earlier))
         expected = 0.0 * tiles
         for i in looked:
@@ -237,12 +238,16 @@ def play(picture, first=16, margin=MARGIN, power=TOGETHER, powers=(OWN, EARLIER,
             own_estimate, noise = GAIN * picture.estimate[levels[i], i], picture.noise[levels[i], i]
             lost = own_estimate if own_estimate < FLOOR * LIMIT / MARGIN else np.exp(pooled - DECAY * np.log(n))
             dark, undenoised[i] = picture.unmet[levels[i], i] > LIMIT, lost > limit
-            need[i] = levels[i] if min(lost, noise) <= limit and not dark else -1
-            expected[i] = 2 * n if dark else n * min((lost / limit) ** (1 / DECAY), (noise / limit) ** 2)
-        needs = np.where(need >= 0, spp[need], spp[levels])
+            denoised, as_rendered = n * (lost / limit) ** (1 / DECAY), n * (noise / limit) ** 2
+            expected[i] = 2 * n if dark else min(denoised, as_rendered)
+            if min(lost, noise) <= limit and not dark:
+                need[i] = n
+            elif not dark and before[i] and expected[i] <= FORESEEN * n:
+                need[i], undenoised[i] = expected[i], as_rendered < denoised
+        needs = np.where(need >= 0, need, spp[levels])
         hardest = min(needs.max(), most * np.sort(needs)[len(needs) // 2])
         wanted = np.maximum(needs, needs**power * hardest ** (1 - power))
-        go = (levels < last) & ((need < 0) | (wanted >= STEP * spp[levels]))
+        go = (levels < last) & ((need < 0) | (need > spp[levels]) | (wanted >= STEP * spp[levels]))
         if not go.any():
             return levels, need >= 0, undenoised, verdicts
         for i in np.flatnonzero(go):

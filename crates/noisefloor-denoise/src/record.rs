@@ -16,7 +16,7 @@ const NEIGHBOURS: f64 = 0.3;
 /// What is kept from one verdict to the next.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Record {
-    /// Tiles that satisfied the last verdict on them, by index.
+    /// Tiles that satisfied the last verdict on them, or will without another, by index.
     pub done: Vec<Option<Done>>,
     /// The logarithm of what each tile would have lost after one sample per pixel, by all estimates of it; NaN before the first.
     at_one: Vec<f64>,
@@ -26,16 +26,16 @@ pub(crate) struct Record {
     pub map: Vec<f32>,
 }
 
-/// A tile that satisfied its last verdict.
+/// A tile that satisfied its last verdict, or does once it has so many samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Done {
-    /// Just-objectionable differences (JOD) that it had lost.
+    /// Just-objectionable differences (JOD) that it had lost, or will have.
     pub lost: f64,
     /// Whether it is shown as rendered.
     pub undenoised: bool,
-    /// Samples per pixel that it had when it was first satisfied: since then, all verdicts on it were.
+    /// Samples per pixel that it had when it was first satisfied, since when all verdicts on it were; or that it needs.
     pub spp: u64,
-    /// Whether it was told to go on beside others: what a verdict on it would say is known.
+    /// Whether it was told to go on, beside others or to where it is satisfied: what a verdict on it would say is known.
     pub ahead: bool,
 }
 
@@ -43,6 +43,11 @@ pub(crate) struct Done {
 const DONE_BYTES: usize = 17;
 
 impl Done {
+    /// Just-objectionable differences (JOD) that it has lost after so many samples per pixel.
+    pub(crate) fn lost_after(&self, spp: u64) -> f64 {
+        self.lost * (self.spp as f64 / spp as f64).max(1.0).powf(DENOISED_DECAY)
+    }
+
     /// A byte, 0 for an open tile, 1 for one that is done, 2 for one that is done as rendered, and two more if it goes on beside
     /// others; and eight each for what it has lost and its samples, little-endian.
     pub(crate) fn to_bytes(done: Option<Self>) -> [u8; DONE_BYTES] {
@@ -94,6 +99,11 @@ impl Record {
             exposure: 0.0,
             map: vec![f32::NAN; grid.width() * grid.height()],
         }
+    }
+
+    /// Whether a tile has been looked at.
+    pub(crate) fn has_seen(&self, tile: Tile) -> bool {
+        !self.at_one[tile.index].is_nan()
     }
 
     /// Takes in what estimates say that tiles have lost after so many samples per pixel. Returns what they say together with

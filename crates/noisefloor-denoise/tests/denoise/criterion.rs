@@ -627,3 +627,37 @@ fn counts_are_drawn_together() {
     // They had less when they were let go for the first time
     assert!([1, 2, 4, 5].into_iter().all(|tile| session.film().spp(tile) as f64 > needs[tile]));
 }
+
+/// It is sampled to where its second estimate says that it is satisfied, and so it is after a resume.
+#[test]
+fn a_tile_is_not_looked_at_a_third_time() {
+    const LOST: f64 = 0.6;
+    let asked: Arc<Mutex<Vec<Vec<Tile>>>> = Arc::default();
+    let criterion = || DenoisedQuality::new(Parted(Simple::Nothing, Arc::clone(&asked)), LOST);
+    let mut session = Session::new(SIZE.0, SIZE.1, criterion(), params(SIZE.0)).unwrap();
+    let (mut noise, mut expected) = (Noise::new(7), None);
+    let looks = || asked.lock().unwrap().len();
+    while !session.is_done() {
+        for request in session.requests() {
+            let deviation = NOISE / (request.spp as f32).sqrt();
+            let pixels: Vec<Rgb> =
+                (0..SIZE.0 * SIZE.1).map(|_| [0.3 + deviation * noise.normal() as f32; 3]).collect();
+            session.push(0, request.spp, &pixels).unwrap();
+        }
+        session.judge().unwrap();
+        if looks() == 2 && expected.is_none() {
+            expected = session.verdict(0).unwrap().expected_spp;
+            assert!(expected.is_some_and(|spp| spp > session.film().spp(0)), "{expected:?}");
+            let mut bytes = Vec::new();
+            session.checkpoint("foreseen").unwrap().write(&mut bytes).unwrap();
+            let again = Session::new(SIZE.0, SIZE.1, criterion(), params(SIZE.0)).unwrap();
+            session = again.resume("foreseen", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+        }
+    }
+    let (spp, verdict) = (session.film().spp(0), session.verdict(0).unwrap());
+    // In steps of 20
+    let in_steps = |spp: u64| spp.div_ceil(20);
+    assert!(verdict.converged && in_steps(spp) == in_steps(expected.unwrap()), "{spp} of {expected:?}");
+    assert_eq!(looks(), 2, "{spp} of {expected:?}");
+    assert!((verdict.lost.unwrap() - LOST / stops_err_by(1)).abs() < 1e-12, "{verdict:?}");
+}
