@@ -290,6 +290,61 @@ def on_black():
     table("on-black", ["samples", "with its exposure given"], rows)
 
 
+# Runs the host of the denoiser, and writes how many pictures each call had, and the processor time before and after
+TIMED = """#!{python} -u
+import os, runpy, sys, time
+sys.argv = sys.argv[-1:]
+sys.path.insert(0, os.path.dirname(sys.argv[0]))
+import host
+def serve(Host, real=host.serve):
+    def timed(self, width, height, frames, real=Host.filter):
+        before, made = time.process_time(), real(self, width, height, frames)
+        print(len(frames), before, time.process_time(), file=open({log!r}, "a"))
+        return made
+    Host.filter = timed
+    real(Host)
+host.serve = serve
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def denoised_seconds():
+    """Where the processor time of `render --denoise` goes; $NOISEFLOOR_OIDN_PYTHON has mitsuba-oidn."""
+    used = lambda: (lambda now: now.ru_utime + now.ru_stime)(resource.getrusage(resource.RUSAGE_CHILDREN))
+    rows = []
+    for scene, size in (("cornell-box", "480x270"), ("arcade", "480x270"), ("cornell-box", "256x256"), ("arcade", "256x256")):
+        with tempfile.TemporaryDirectory() as folder:
+            timed, log = pathlib.Path(folder, "python"), f"{folder}/calls"
+            timed.write_text(TIMED.format(python=os.environ["NOISEFLOOR_OIDN_PYTHON"], log=log))
+            timed.chmod(0o755)
+            before = used()
+            run(NOISEFLOOR, "render", scene, "--denoise", "oidn", "--size", size, "--seed", 5, "--out", f"{folder}/out",
+                env={**os.environ, "NOISEFLOOR_OIDN_PYTHON": str(timed)}, stderr=subprocess.DEVNULL)
+            everything = used() - before
+            calls = [[float(word) for word in line.split()] for line in open(log)]
+            report = json.loads(pathlib.Path(folder, "out/report.json").read_text())
+        width, height = map(int, size.split("x"))
+        verdicts, finished = (sum(end - start for count, start, end in calls if count == n) for n in (2, 1))
+        start = calls[-1][2] - verdicts - finished
+        rows.append([f"{scene}, {size.replace('x', '×')}", f"{report['samples'] / width / height:.0f}", f"{sum(c[0] == 2 for c in calls)}",
+                     *(f"{seconds:.1f}" for seconds in (everything - calls[-1][2], verdicts, finished, start, everything)),
+                     factor(everything / (everything - verdicts))])
+    table("denoised-seconds", ["samples", "verdicts", "rendering", "verdicts' denoisings", "finished picture", "the denoiser's start", "all",
+                               "over all but verdicts"], rows)
+
+
+def hard():
+    """Scenes that are hard to denoise: benchmarks/hard.csv, by larger.py with SIZE = (128, 72) and 256 samples."""
+    with open(ROOT / "benchmarks/hard.csv") as lines:
+        kept = list(csv.DictReader(lines))
+    def lost(scene, key, times=1.0):
+        means = (statistics.mean(float(r[key]) for r in kept if (r["scene"], r["spp"]) == (scene, spp)) for spp in ("16", "64", "256"))
+        return ", ".join(f"{times * mean:.1f}" for mean in means)
+    # Verdicts count the mean of four mirror images as 0.97
+    rows = [[scene, lost(scene, "estimate", 0.97), lost(scene, "true"), lost(scene, "true_denoised")] for scene in sorted({r["scene"] for r in kept})]
+    table("hard", ["estimated", "lost", "against denoised references"], rows)
+
+
 def large():
     """Time, memory and files of renders of a minute."""
     rows = []
