@@ -28,7 +28,9 @@ pub(crate) enum Adapted {
 pub(crate) struct Engine {
     photometry: Photometry,
     pub(crate) bands: Bands,
-    masking: Masking,
+    pub(crate) masking: Masking,
+    /// The same, but that colour hides no light and dark.
+    pub(crate) greys_unmasked: Masking,
     blur: Blur,
     /// Gains of noise that is new in every frame, by channel; `None` for stills.
     pub(crate) film: Option<[f32; ALL_CHANNELS]>,
@@ -40,6 +42,7 @@ impl Engine {
             photometry: Photometry::new(viewing),
             bands: Bands::new(viewing.pixels_per_degree()),
             masking: Masking::new(),
+            greys_unmasked: Masking::new().without_colour_on_greys(),
             blur: blur(),
             film: viewing.frames_per_second().map(gains),
         }
@@ -139,7 +142,7 @@ impl Engine {
         band: usize,
         size: Size,
         (contrasts, differences): (Range<usize>, Range<usize>),
-        adapted: Adapted,
+        (adapted, masking): (Adapted, &Masking),
         workspace: &mut VisionWorkspace,
     ) {
         let blurs = size.width > BLUR_RADIUS && size.height > BLUR_RADIUS;
@@ -157,7 +160,7 @@ impl Engine {
             let transient = self.film.map(|_| &mut transient[band][strip.clone()]);
             let blur = blurs.then_some(&self.blur);
             let place = (smaller, size, rows.start);
-            mask_rows(&self.masking, blur, place, channels, transient, &mut room.mask);
+            mask_rows(masking, blur, place, channels, transient, &mut room.mask);
         }
     }
 

@@ -159,6 +159,12 @@ impl Masking {
         }
     }
 
+    /// As if what is coloured did not mask the achromatic channel.
+    pub(crate) fn without_colour_on_greys(mut self) -> Self {
+        self.weights[1..].iter_mut().for_each(|of_colour| of_colour[0] = 0.0);
+        self
+    }
+
     /// How much a contrast of a channel masks, before it is weighted.
     #[inline(always)]
     fn power(&self, channel: usize, contrast: f32) -> f32 {

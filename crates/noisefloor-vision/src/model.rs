@@ -112,7 +112,13 @@ impl VisionModel {
         let mut pooled = Vec::with_capacity(sizes.len());
         for (band, &size) in sizes[..baseband].iter().enumerate() {
             let whole = 0..size.height;
-            engine.band::<CHANNELS>(band, size, (whole.clone(), whole), Adapted::ToReference, workspace);
+            engine.band::<CHANNELS>(
+                band,
+                size,
+                (whole.clone(), whole),
+                (Adapted::ToReference, &engine.masking),
+                workspace,
+            );
             pooled.push(pool(&workspace.differences, band, size, film));
         }
         engine.baseband(baseband, sizes[baseband], workspace);

@@ -30,4 +30,10 @@ impl Part {
         let ends = |(from, to): (usize, usize), most: usize| (from.saturating_sub(by), (to + by).min(most));
         Self { x: ends(self.x, size.width), y: ends(self.y, size.height) }
     }
+
+    /// Where it lies once its picture, of `size`, is turned by 180 degrees.
+    pub(crate) fn turned(self, size: Size) -> Self {
+        let ends = |(from, to): (usize, usize), most: usize| (most - to, most - from);
+        Self { x: ends(self.x, size.width), y: ends(self.y, size.height) }
+    }
 }

@@ -271,6 +271,20 @@ pub(crate) fn greys(
     }
 }
 
+/// Turns the light of two pictures in colour into that of their greys, which differs by as much as before where
+/// that is more.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx2", "x86_64+avx2"))]
+pub(crate) fn keep_greys([one, other]: [&mut [f32]; 2], [grey, other_grey]: [&[f32]; 2]) {
+    let pairs = one.iter_mut().zip(other).zip(grey.iter().zip(other_grey));
+    for ((one, other), (&grey, &other_grey)) in pairs {
+        let (sum, difference) = (*one + *other, *one - *other);
+        let (greys, of_greys) = (grey + other_grey, grey - other_grey);
+        let stronger = difference.abs() * greys > of_greys.abs() * sum;
+        let apart = if stronger { difference * greys / sum } else { of_greys };
+        (*one, *other) = (0.5 * (greys + apart), 0.5 * (greys - apart));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

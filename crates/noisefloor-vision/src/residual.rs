@@ -5,12 +5,12 @@ use crate::check::{check_values, checked};
 use crate::csf::OpponentChannel;
 use crate::engine::{Adapted, Engine, build, collapse};
 use crate::error::VisionError;
-use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST, grown};
+use crate::masking::{BLUR_RADIUS, EXPONENT, LARGEST, Masking, grown};
 use crate::model::VisionModel;
 use crate::part::Part;
-use crate::photometry::CHANNELS;
+use crate::photometry::{CHANNELS, keep_greys};
 use crate::pooling::{STILL, across_row, energy_row};
-use crate::pyramid::Size;
+use crate::pyramid::{Size, expand_row};
 use crate::temporal::TRANSIENT;
 use crate::workspace::{Sizes, VisionWorkspace};
 use std::ops::Range;
@@ -33,6 +33,14 @@ pub enum ResidualPixels<'a> {
         picture: &'a [f32],
         /// With half of it added and taken away, the middle makes the two pictures.
         residual: &'a [f32],
+    },
+    /// As greys, and what is seen in colour beside them: colour adds to what greys show, and hides none of it.
+    /// Light and dark differ as greys do, or as the light of the colours does where that is more.
+    GreyAndRgb {
+        /// The middle and the residual as greys.
+        grey: [&'a [f32]; 2],
+        /// The middle and the residual in colour.
+        rgb: [[&'a [f32]; 3]; 2],
     },
 }
 
@@ -75,14 +83,14 @@ impl VisionDetail {
 /// the workspace.
 #[derive(Debug)]
 pub struct VisibleDifference<'a> {
+    engine: &'a Engine,
+    masking: &'a Masking,
     workspace: &'a mut VisionWorkspace,
     sizes: Sizes,
     bands: Range<usize>,
     /// The first band of which chromatic channels are there; the end of all if none are.
     chromatic: usize,
-    film: bool,
     part: Part,
-    frequencies: &'a [f64],
 }
 
 /// Visible differences of one band and channel.
@@ -147,29 +155,33 @@ impl VisionModel {
         if part.columns().is_empty() || part.rows().is_empty() || part.x.1 > width || part.y.1 > height {
             return Err(VisionError::Region);
         }
-        let bands = self.engine.bands.within(size, detail.frequencies);
-        let of_chroma = |&band: &usize| self.engine.bands.frequencies[band] <= detail.chromatic_below;
+        let engine = &self.engine;
+        let bands = engine.bands.within(size, detail.frequencies);
+        let of_chroma = |&band: &usize| engine.bands.frequencies[band] <= detail.chromatic_below;
         let chromatic = match patch.pixels {
-            ResidualPixels::Rgb { .. } => bands.clone().find(of_chroma).unwrap_or(bands.end),
             ResidualPixels::Grey { .. } => bands.end,
+            _ => bands.clone().find(of_chroma).unwrap_or(bands.end),
+        };
+        let masking = match patch.pixels {
+            ResidualPixels::GreyAndRgb { .. } => &engine.greys_unmasked,
+            _ => &engine.masking,
         };
         let channels = if chromatic < bands.end { CHANNELS } else { 1 };
-        let film = self.engine.film.is_some();
-        let sizes = workspace.fit(size, bands.end + 1, channels, film);
-        load(&self.engine, patch, size, channels, workspace)?;
+        let sizes = workspace.fit(size, bands.end + 1, channels, engine.film.is_some());
+        load(engine, patch, size, channels, workspace)?;
         if channels == 1 {
-            filter_and_build::<1>(&self.engine, &sizes, workspace);
+            engine.filter_both::<1>(size, workspace);
         } else {
-            filter_and_build::<CHANNELS>(&self.engine, &sizes, workspace);
+            engine.filter_both::<CHANNELS>(size, workspace);
         }
-        differ::<1>(&self.engine, &sizes, bands.start..chromatic, part, workspace);
-        differ::<CHANNELS>(&self.engine, &sizes, chromatic..bands.end, part, workspace);
-        let frequencies = &self.engine.bands.frequencies[bands.clone()];
-        Ok(VisibleDifference { workspace, sizes, bands, chromatic, film, part, frequencies })
+        let mut difference =
+            VisibleDifference { engine, masking, workspace, sizes, bands: bands.clone(), chromatic, part };
+        difference.compute(bands);
+        Ok(difference)
     }
 }
 
-impl VisibleDifference<'_> {
+impl<'a> VisibleDifference<'a> {
     /// One number a place: bands and channels together, as in the map of ColorVideoVDP before it turns into
     /// JODs. Its step is that of the finest band that was computed.
     pub fn map(&mut self) -> DifferenceBand<'_> {
@@ -183,7 +195,7 @@ impl VisibleDifference<'_> {
     /// differences are up to 5 % lower at half the contrast, 11 % with colour; a noisy picture that has lost
     /// noise masks less, so that they are higher.
     pub fn map_at(&mut self, contrast: f32) -> DifferenceBand<'_> {
-        self.draw(contrast.clamp(1e-6, 1e6).powf(EXPONENT), 1.0, [1.0; CHANNELS]);
+        self.draw(self.bands.clone(), contrast.clamp(1e-6, 1e6).powf(EXPONENT), 1.0, [1.0; CHANNELS]);
         self.plane(self.bands.start, &self.workspace.map[self.bands.start])
     }
 
@@ -191,27 +203,95 @@ impl VisibleDifference<'_> {
     /// 2/2.26. At a contrast of 1, noise is about at the threshold. It grows as the variance of the residual does, so
     /// that means of it over any place are worth samples, as variances are; that holds exactly if the picture masks
     /// as before, up to contrasts of some 700.
-    pub fn contrast_energy(&mut self) -> DifferenceBand<'_> {
+    ///
+    /// The pyramid leaves every other pixel out, so that a dot in an odd row and column differs by less than one
+    /// in even ones. All bands but the finest are therefore means of two pyramids, the other one that of the
+    /// pictures turned by 180 degrees.
+    pub fn contrast_energy(mut self) -> DifferenceBand<'a> {
         // So weak a residual is nowhere near the limit; what it is weaker by is taken back
         const WEAK: f32 = 1e-4;
-        self.draw(WEAK, 1.0 / WEAK, BESIDE_ACHROMATIC);
-        let first = self.bands.start;
+        let draw = |of: &mut Self, bands| of.draw(bands, WEAK, 1.0 / WEAK, BESIDE_ACHROMATIC);
+        let Range { start: first, end } = self.bands;
+        // Coarser pixels than those of the picture do not lie on each other when it is turned
+        if first > 0 || end < 2 {
+            draw(&mut self, first..end);
+        } else {
+            draw(&mut self, 0..1);
+            draw(&mut self, 1..end);
+            self.turn(1..end);
+            draw(&mut self, 1..end);
+            self.turn_back();
+        }
         let (part, width) = (self.part.at(first), self.sizes[first].width);
         for y in part.rows() {
             energy_row(&mut self.workspace.map[first][y * width..][part.columns()]);
         }
-        self.plane(first, &self.workspace.map[first])
+        let Self { engine, workspace, sizes, part, .. } = self;
+        band_of(engine, first, &sizes, part, &workspace.map[first])
     }
 
-    /// Draws the map of a residual whose differences grow by `growth`, times `scale`, and those of each channel times a
-    /// weight.
-    fn draw(&mut self, growth: f32, scale: f32, weights: [f32; CHANNELS]) {
-        let Self { sizes, bands, chromatic, film, part, .. } = self;
+    /// Keeps the map of these bands, all but the finest, and computes them of the turned pictures.
+    fn turn(&mut self, bands: Range<usize>) {
+        let VisionWorkspace { gauss, flicker, map, upright, .. } = &mut *self.workspace;
+        std::mem::swap(&mut map[1], upright);
+        let channels = if self.chromatic < self.bands.end { CHANNELS } else { 1 };
+        let of_stills = gauss.iter_mut().flat_map(|of| &mut of[..channels]);
+        for levels in of_stills.chain(self.engine.film.is_some().then_some(flicker)) {
+            levels[0][..self.sizes[0].area()].reverse();
+        }
+        self.part = self.part.turned(self.sizes[0]);
+        self.compute(bands);
+    }
+
+    /// Adds the mean of the map that was kept and of that of the turned pictures to the finest band.
+    fn turn_back(&mut self) {
+        let size = self.sizes[0];
+        self.part = self.part.turned(size);
+        let VisionWorkspace { map, upright, strip, .. } = &mut *self.workspace;
+        let [finest, turned, ..] = &mut map[..] else { return };
+        let row = &mut strip.places[..size.width];
+        for y in self.part.rows() {
+            let finest = &mut finest[y * size.width..][..size.width];
+            expand_row(upright, size, y, &mut strip.narrow, row);
+            finest.iter_mut().zip(&*row).for_each(|(out, coarse)| *out += 0.5 * coarse);
+            expand_row(turned, size, size.height - 1 - y, &mut strip.narrow, row);
+            finest.iter_mut().zip(row.iter().rev()).for_each(|(out, coarse)| *out += 0.5 * coarse);
+        }
+    }
+
+    /// Builds the levels of the pictures, and computes these bands of them.
+    fn compute(&mut self, bands: Range<usize>) {
+        let film = self.engine.film.is_some();
+        let chromatic = self.chromatic.clamp(bands.start, bands.end);
+        if self.chromatic < self.bands.end {
+            build::<CHANNELS>(&self.sizes, film, self.workspace);
+        } else {
+            build::<1>(&self.sizes, film, self.workspace);
+        }
+        self.differ::<1>(bands.start..chromatic);
+        self.differ::<CHANNELS>(chromatic..bands.end);
+    }
+
+    /// Computes bands of `N` channels.
+    fn differ<const N: usize>(&mut self, bands: Range<usize>) {
+        for band in bands {
+            let size = self.sizes[band];
+            let wanted = self.part.at(band).wider(MARGIN, size);
+            let rows = (wanted.wider(BLUR_RADIUS, size).rows(), wanted.rows());
+            self.engine.band::<N>(band, size, rows, (Adapted::ToBoth, self.masking), self.workspace);
+        }
+    }
+
+    /// Draws the map of these bands of a residual whose differences grow by `growth`, times `scale`, and those of
+    /// each channel times a weight.
+    fn draw(&mut self, bands: Range<usize>, growth: f32, scale: f32, weights: [f32; CHANNELS]) {
+        let Self { engine, sizes, chromatic, part, .. } = self;
+        let film = engine.film.is_some();
         let VisionWorkspace { differences, map, strip, .. } = &mut *self.workspace;
         let parts = |band: usize| part.at(band).wider(MARGIN, sizes[band]);
         for band in bands.clone() {
             // The pyramid halves contrasts between its finest and its coarsest band
-            let scale = scale * if *film { 1.0 } else { STILL as f32 } * if band == 0 { 1.0 } else { 0.5 };
+            let scale = scale * if film { 1.0 } else { STILL as f32 } * if band == 0 { 1.0 } else { 0.5 };
             for y in parts(band).rows() {
                 let Range { start, end } = parts(band).columns();
                 let here = y * sizes[band].width + start..y * sizes[band].width + end;
@@ -224,7 +304,7 @@ impl VisibleDifference<'_> {
                 }
             }
         }
-        collapse(map, bands.clone(), sizes, |band| parts(band).rows(), &mut strip.narrow, &mut strip.places);
+        collapse(map, bands, sizes, |band| parts(band).rows(), &mut strip.narrow, &mut strip.places);
     }
 
     /// The bands of a channel, finest first, without the transient channel of a film; those of chromatic channels that were computed.
@@ -234,16 +314,20 @@ impl VisibleDifference<'_> {
         (from..self.bands.end).map(|band| self.plane(band, &planes[band]))
     }
 
-    fn plane<'a>(&self, band: usize, plane: &'a [f32]) -> DifferenceBand<'a> {
-        let frequency = self.frequencies[band - self.bands.start];
-        DifferenceBand {
-            frequency,
-            step: 1 << band,
-            plane,
-            stride: self.sizes[band].width,
-            part: self.part.at(band),
-        }
+    fn plane<'b>(&self, band: usize, plane: &'b [f32]) -> DifferenceBand<'b> {
+        band_of(self.engine, band, &self.sizes, self.part, plane)
     }
+}
+
+fn band_of<'a>(
+    engine: &Engine,
+    band: usize,
+    sizes: &Sizes,
+    part: Part,
+    plane: &'a [f32],
+) -> DifferenceBand<'a> {
+    let frequency = engine.bands.frequencies[band];
+    DifferenceBand { frequency, step: 1 << band, plane, stride: sizes[band].width, part: part.at(band) }
 }
 
 /// A visible difference of one band and channel after the residual has been multiplied by `contrast`: it
@@ -291,33 +375,31 @@ fn load(
                 engine.load_grey(of, size, workspace, picture, (share, residual));
             }
         }
+        ResidualPixels::GreyAndRgb { grey: [picture, residual], rgb: [colours, of_colours] } => {
+            for values in [picture, residual].into_iter().chain(colours).chain(of_colours) {
+                check_values(values, size)?;
+            }
+            for (of, share) in SHARES.into_iter().enumerate() {
+                engine.load_grey(of, size, workspace, picture, (share, residual));
+            }
+            if channels > 1 {
+                let VisionWorkspace { gauss: [one, other], differences, map, .. } = &mut *workspace;
+                std::mem::swap(&mut one[0][0], &mut differences[0][0]);
+                std::mem::swap(&mut other[0][0], &mut map[0]);
+                for (of, share) in SHARES.into_iter().enumerate() {
+                    engine.load_planes::<CHANNELS>(of, size, workspace, colours, (share, of_colours));
+                }
+                let VisionWorkspace { gauss: [one, other], differences, map, .. } = &mut *workspace;
+                let planes = [&mut one[0][0], &mut other[0][0]].map(|plane| &mut plane[..size.area()]);
+                keep_greys(planes, [&differences[0][0], &map[0]]);
+            }
+        }
     }
     Ok(())
 }
 
 /// Interpolation of a band reads so far beyond what is wanted of the next finer one.
 const MARGIN: usize = 2;
-
-/// Levels of `N` channels of both pictures.
-fn filter_and_build<const N: usize>(engine: &Engine, sizes: &Sizes, workspace: &mut VisionWorkspace) {
-    engine.filter_both::<N>(sizes[0], workspace);
-    build::<N>(sizes, engine.film.is_some(), workspace);
-}
-
-/// Computes bands of `N` channels in a part of the picture.
-fn differ<const N: usize>(
-    engine: &Engine,
-    sizes: &Sizes,
-    bands: Range<usize>,
-    part: Part,
-    workspace: &mut VisionWorkspace,
-) {
-    for band in bands {
-        let wanted = part.at(band).wider(MARGIN, sizes[band]);
-        let rows = (wanted.wider(BLUR_RADIUS, sizes[band]).rows(), wanted.rows());
-        engine.band::<N>(band, sizes[band], rows, Adapted::ToBoth, workspace);
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -23,6 +23,8 @@ pub struct VisionWorkspace {
     pub(crate) smaller: [Vec<f32>; CHANNELS],
     /// The map: by band.
     pub(crate) map: Vec<Vec<f32>>,
+    /// The map without its finest band, while that of the turned picture is drawn.
+    pub(crate) upright: Vec<f32>,
     pub(crate) strip: Strip,
 }
 
@@ -88,6 +90,7 @@ impl VisionWorkspace {
         self.gauss.iter_mut().flat_map(|channel| &mut channel[..channels]).for_each(levels);
         self.differences[..channels].iter_mut().for_each(levels);
         levels(&mut self.map);
+        reserve(&mut self.upright, size.half().area());
         if film {
             [&mut self.flicker, &mut self.differences[TRANSIENT]].into_iter().for_each(levels);
             self.standing[..channels].iter_mut().for_each(|plane| reserve(plane, size.area()));

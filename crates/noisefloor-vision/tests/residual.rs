@@ -328,7 +328,7 @@ fn the_energy_of_a_film_grows_as_variance_does() {
         let mut workspace = VisionWorkspace::default();
         let planar = Planar::new(&picture, &residual);
         let patch = whole(&planar, size);
-        let mut found = film.residual(&patch, VisionDetail::FAST, &mut workspace).unwrap();
+        let found = film.residual(&patch, VisionDetail::FAST, &mut workspace).unwrap();
         found.contrast_energy().pooled(1.0)
     };
     let grown = energy(2.0) / energy(1.0);

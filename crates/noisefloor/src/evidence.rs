@@ -51,13 +51,13 @@ thread_local! {
 }
 
 /// Noise in R′ and B′ beside what it would be in the colour of the picture, over the strongest in Y′, from which on it counts as
-/// strongly coloured. Lamps of 2500 K on grey have 0.7 of B′, dots of green 0.8 to 1, of which greys still tell what they cost
-/// within 0.05 JOD; dots of red have 3.7, of blue 12.
-const OTHER_COLOUR: f32 = 0.95;
+/// strongly coloured. Lamps of 2500 K on grey have 0.7 of B′, dots of green and cyan 0.8 to 1, of which greys still tell what they
+/// cost within 0.05 JOD; dots of magenta have 2.6, of red 3.7, of blue 12.
+const OTHER_COLOUR: f32 = 1.4;
 /// Noise in R′ − Y′ and in B′ − Y′, over the strongest in Y′, from which on it counts as strongly coloured even in the colour of
-/// the picture. At these, the contrast in units of the vision model's threshold is below that of Y′ in all bands from one cycle
-/// per degree on, and two thirds of it in the finer ones, where noise of single pixels is seen.
-const SATURATED: [f32; 2] = [3.5, 4.2];
+/// the picture. At these, the contrast in units of the vision model's threshold is below one and a half times that of Y′ in all
+/// bands from one cycle per degree on, and as large in the finer ones, where noise of single pixels is seen.
+const SATURATED: [f32; 2] = [5.2, 6.3];
 /// What nobody sees of it: a step of eight bits. At ten cycles per degree and fewer, the eye is four to ten times as sensitive
 /// to Y′ as to either.
 const UNSEEN: f32 = 1.0 / 255.0;
@@ -84,7 +84,7 @@ pub struct TilePlanes {
     pub rounding: f32,
     /// On which display the picture is seen, and from how far: the default, unless changed.
     pub viewing: Viewing,
-    /// The same in R′, G′ and B′, where noise is so strongly coloured that greys do not tell how visible it is.
+    /// The same in R′, G′ and B′, where noise is so strongly coloured that greys may show too little of it.
     pub colour: Option<ColourPlanes>,
     /// The tile itself within the planes: rows and columns of the planes that belong to it.
     pub inner: Tile,

@@ -23,7 +23,7 @@ use super::texture::texture_energy;
 use super::windows::{BLOCK, PictureContrast, WindowContrast, block_count, block_sums};
 use crate::descriptor::NoiseMask;
 use crate::display::ROUNDING_LUMINANCE;
-use crate::evidence::{ColourPlanes, Plane, TilePlanes};
+use crate::evidence::{Plane, TilePlanes};
 use noisefloor_vision::{
     ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel, VisionWorkspace,
 };
@@ -298,10 +298,7 @@ thread_local! {
 }
 
 /// What `use_them` makes of the visible differences in a tile; `None` if a pixel is not finite.
-fn with_differences<T>(
-    planes: &TilePlanes,
-    use_them: impl FnOnce(&mut VisibleDifference<'_>) -> T,
-) -> Option<T> {
+fn with_differences<T>(planes: &TilePlanes, use_them: impl FnOnce(VisibleDifference<'_>) -> T) -> Option<T> {
     EYES.with_borrow_mut(|Eyes { model, workspace }| {
         if model.as_ref().is_some_and(|model| *model.viewing() != planes.viewing) {
             *model = None;
@@ -312,10 +309,9 @@ fn with_differences<T>(
         let t = planes.inner;
         let (pixels, detail) = match &planes.colour {
             None => (ResidualPixels::Grey { picture, residual }, VisionDetail::FAST),
-            Some(ColourPlanes { image, residual }) => {
-                let [picture, residual] =
-                    [image, residual].map(|planes| planes.each_ref().map(Plane::values));
-                (ResidualPixels::Rgb { picture, residual }, VisionDetail::COLOUR)
+            Some(colour) => {
+                let rgb = [&colour.image, &colour.residual].map(|rgb| rgb.each_ref().map(Plane::values));
+                (ResidualPixels::GreyAndRgb { grey: [picture, residual], rgb }, VisionDetail::COLOUR)
             }
         };
         let patch = ResidualPatch {
@@ -324,7 +320,7 @@ fn with_differences<T>(
             columns: t.x..t.x + t.width,
             rows: t.y..t.y + t.height,
         };
-        model.residual(&patch, detail, workspace).ok().as_mut().map(use_them)
+        model.residual(&patch, detail, workspace).ok().map(use_them)
     })
 }
 

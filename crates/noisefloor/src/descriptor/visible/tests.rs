@@ -48,6 +48,37 @@ fn noise_of_a_film_is_weaker() {
     assert_eq!([&slow[1..], &fast[1..]], [&still[1..]; 2]);
 }
 
+/// What people were asked about is seen as greys: in still pictures and in films, colour adds to that, much where greys show next
+/// to nothing of it, and takes nothing away where the vision model holds it for hardly visible.
+#[test]
+fn colour_only_adds_to_what_greys_show() {
+    let tile = TileGrid::new(96, 80, 96).unwrap().tile(0);
+    let (grey, orange) = ([0.5; 3], [0.74, 0.48, 0.31]);
+    for (wall, colour, least) in
+        [(grey, [0.0, 0.0, 1.0], 1.2), (grey, [1.0, 0.0, 1.0], 1.03), (orange, [0.0, 0.0, 1.0], 1.0)]
+    {
+        let mut random = Noise::new(29);
+        let values: Vec<f32> = (0..96 * 80).map(|_| 0.05 * random.normal() as f32).collect();
+        let noise = |x: usize, y: usize| colour.map(|c: f32| c * values[y * 96 + x]);
+        let planes = TilePlanes::gather((96, 80), tile, |x, y| (wall, noise(x, y)));
+        assert!(planes.colour.is_some());
+        for viewing in ["desk", "desk,fps=24"] {
+            let in_colour = on(viewing, &planes);
+            let greys = TilePlanes { colour: None, ..in_colour.clone() };
+            let [in_colour, greys] =
+                [&in_colour, &greys].map(|planes| Descriptor::visible().describe_tile(planes, 50.0).unwrap());
+            let pairs = || in_colour.blocks.as_flattened().iter().zip(greys.blocks.as_flattened());
+            // But for their rounding
+            assert!(
+                pairs().all(|(in_colour, greys)| *in_colour >= 0.999 * greys),
+                "{wall:?} {colour:?} {viewing}"
+            );
+            let more = amplitude(in_colour.own[0]) / amplitude(greys.own[0]);
+            assert!(more >= least, "{wall:?} {colour:?} {viewing}: {more}");
+        }
+    }
+}
+
 /// Of two halves of a tile, one without noise, the windows in the noisy one count, however large the other is; and a
 /// window on the border of two tiles is seen by both.
 #[test]
