@@ -74,6 +74,24 @@ fn one_find_may_lie_anywhere_around_it_and_in_the_picture() {
     }
 }
 
+/// Finds of one colour count by how well they are seen beside grey ones, not by their luminance, and those of all three as grey ones.
+#[test]
+fn finds_of_a_colour_count_as_they_are_seen() {
+    let flat = vec![[BASE; 3]; EDGE * EDGE];
+    let found = |colour: Rgb| {
+        let mut dotted = flat.clone();
+        dotted[5 * EDGE + 6] = colour.map(|c| BASE + 14.0 * c);
+        all(&film([&dotted, &flat], [5, 5]))[0].unwrap().light / 7.0
+    };
+    let [red, green, blue] =
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|c| (found(c), crate::display::luminance(c)));
+    for ((seen, luminance), times) in [red, green, blue].into_iter().zip([1.0, 1.0, 1.4]) {
+        let ratio = seen / f64::from(luminance) / times;
+        assert!((0.93..1.07).contains(&ratio), "{seen} {luminance}");
+    }
+    assert!((red.0 + green.0 + blue.0 - 1.0).abs() < 1e-4 && (found([1.0; 3]) - 1.0).abs() < 1e-4);
+}
+
 /// As much light may be missing that nothing has met, in half as much of it for twice the samples; a tile that has met light
 /// of that order lacks none.
 #[test]
