@@ -7,10 +7,10 @@ use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13_BOLD, FONT_9
 use noisefloor::TileGrid;
 use noisefloor_image::maps::Canvas;
 use plotters::prelude::{
-    ChartBuilder, Circle, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor, SVGBackend, WHITE,
+    BindKeyPoints, ChartBuilder, Circle, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor,
+    SVGBackend, WHITE,
 };
 use plotters::style::Color;
-use std::cell::Cell;
 use std::ops::Range;
 
 const SIZE: (u32, u32) = (720, 480);
@@ -24,16 +24,14 @@ fn failed(error: impl std::fmt::Display) -> StudyError {
     StudyError::Analysis(format!("a plot cannot be drawn: {error}"))
 }
 
-/// Labels of a logarithmic axis, none of which touch: 1, 2, 3 and 5 times a power of ten, each once, since plotters asks
-/// twice for powers of ten; everything where little is covered.
-fn samples(covered: Range<f64>) -> impl Fn(&f64) -> String {
-    let (last, all) = (Cell::new(0.0), covered.end / covered.start < 6.0);
-    move |&spp| {
-        let digit = spp / 10f64.powf((spp * (1.0 + 1e-9)).log10().floor());
-        let is_plain = [1.0, 2.0, 3.0, 5.0].iter().any(|plain| (digit - plain).abs() < 1e-6);
-        let is_new = last.replace(spp) != spp;
-        if is_new && (all || is_plain) { format!("{spp:.0}") } else { String::new() }
-    }
+/// Labels of a logarithmic axis, none of which touch: 1, 2, 3 and 5 times a power of ten, or all digits where little is covered.
+fn ticks(covered: &Range<f64>) -> Vec<f64> {
+    let all = covered.end / covered.start < 6.0;
+    let digits = (1..10).filter(|digit| all || [1, 2, 3, 5].contains(digit)).map(f64::from);
+    // plotters has none below the first power of ten
+    let powers = (0..=covered.end.log10() as i32).map(|power| 10f64.powi(power));
+    let every = powers.flat_map(|power| digits.clone().map(move |digit| digit * power));
+    every.filter(|spp| (covered.start..=covered.end).contains(spp)).collect()
 }
 
 /// Mean and 95 % level of each tile with intervals, in table order.
@@ -43,6 +41,9 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
         ends.chain([t.mean, t.level95]).collect::<Vec<_>>()
     });
     let (low, high) = all.fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v.max(0.1)), h.max(v)));
+    let shown = low / 1.2..high * 1.2;
+    let named: Vec<f64> =
+        (0..tiles.len()).step_by(tiles.len().div_ceil(24).max(1)).map(|tile| tile as f64).collect();
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
@@ -51,20 +52,18 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
             .margin(12)
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d(-0.5..tiles.len() as f64 - 0.5, (low / 1.2..high * 1.2).log_scale())
+            .build_cartesian_2d(
+                (-0.5..tiles.len() as f64 - 0.5).with_key_points(named),
+                shown.clone().log_scale().with_key_points(ticks(&shown)),
+            )
             .map_err(failed)?;
         chart
             .configure_mesh()
             .disable_x_mesh()
-            .x_labels((2 * tiles.len()).clamp(2, 24))
             .x_desc("tile, in the order of tiles.csv (blue: mean; red: 95 % see no difference)")
             .y_desc("samples per pixel")
-            // Only where there is a tile
-            .x_label_formatter(&|x| match (x.round() - x).abs() < 1e-6 {
-                true => format!("{}", x.round() as i64),
-                false => String::new(),
-            })
-            .y_label_formatter(&samples(low..high))
+            .x_label_formatter(&|tile| format!("{tile:.0}"))
+            .y_label_formatter(&|spp| format!("{spp:.0}"))
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
             .light_line_style(WHITE)
@@ -100,13 +99,13 @@ pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, Study
             .margin_right(32) // half of the last label
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d((low..high).log_scale(), 0.0..1.0)
+            .build_cartesian_2d((low..high).log_scale().with_key_points(ticks(&(low..high))), 0.0..1.0)
             .map_err(failed)?;
         chart
             .configure_mesh()
-            .x_desc("samples per pixel; a line a tile, a dot where 95 % see no difference")
+            .x_desc("samples per pixel (lines: the likeliest curve of a tile; dots: 95 %, over all that fit)")
             .y_desc("share who see no difference")
-            .x_label_formatter(&samples(low..high))
+            .x_label_formatter(&|spp| format!("{spp:.0}"))
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
             .light_line_style(WHITE)
@@ -198,14 +197,10 @@ pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold
 mod tests {
     use super::*;
 
-    /// As plotters asks: each value of a decade, and powers of ten at the end of one and the beginning of the next.
     #[test]
-    fn labels_of_an_axis_do_not_touch() {
-        let label = samples(8.0..2000.0);
-        let asked = [80.0, 90.0, 100.0, 100.0, 200.0, 300.0, 400.0, 500.0, 900.0, 1000.0, 1000.0];
-        let said: Vec<String> = asked.iter().map(&label).filter(|l| !l.is_empty()).collect();
-        assert_eq!(said, ["100", "200", "300", "500", "1000"]);
-        let narrow: Vec<String> = [400.0, 600.0, 700.0].iter().map(samples(350.0..800.0)).collect();
-        assert_eq!(narrow, ["400", "600", "700"]);
+    fn all_of_an_axis_has_labels() {
+        assert_eq!(ticks(&(28.0..1300.0)), [30.0, 50.0, 100.0, 200.0, 300.0, 500.0, 1000.0]);
+        assert_eq!(ticks(&(350.0..800.0)), [400.0, 500.0, 600.0, 700.0, 800.0]);
+        assert_eq!(ticks(&(0.8..4.0)), [1.0, 2.0, 3.0, 4.0]);
     }
 }
