@@ -2,8 +2,12 @@
 """Cycles' noise threshold: defaults, guesses, fixed samples, what Find Noise Threshold finds, and the add-on's own loop,
 for docs/benchmarks/blender.md.
 
-    tune.py render ADDON.zip SCENE(.py|.blend) WIDTHxHEIGHT FOLDER [REFERENCE_SPP [SEEDS [DEVICE]]]   in an environment that has bpy
+    tune.py render ADDON.zip SCENE WIDTHxHEIGHT FOLDER [REFERENCE_SPP [SEEDS [DEVICE]]]   in an environment that has bpy
     tune.py measure FOLDER...                                                       pip install cvvdp pillow
+    tune.py small FOLDER...
+
+SCENE is a .blend file, a script, or one of several in a script, as in scenes.py:hair, of which only what is found, Cycles' default and the
+loop are rendered; `small` has the table of these.
 
 `render` writes what Blender shows (view transform included) as PNGs of 16 bits, denoised by Cycles' own Open Image
 Denoise, two seeds a setting unless said otherwise, beside times.json with the processor seconds of each render and of the search,
@@ -14,6 +18,7 @@ import json
 import pathlib
 import resource
 import runpy
+import statistics
 import sys
 import tempfile
 import time
@@ -29,10 +34,6 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
 
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    if path.endswith(".py"):
-        runpy.run_path(path)
-    else:
-        bpy.ops.wm.open_mainfile(filepath=path)
     width, height = map(int, size.split("x"))
     unpacked = tempfile.mkdtemp()
     zipfile.ZipFile(addon).extractall(unpacked)
@@ -40,6 +41,13 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
     import noisefloor_addon
 
     noisefloor_addon.register()
+    path, _, small = path.partition(":")
+    if small:
+        runpy.run_path(path)["SCENES"][small]()
+    elif path.endswith(".py"):
+        runpy.run_path(path)
+    else:
+        bpy.ops.wm.open_mainfile(filepath=path)
     scene = bpy.context.scene
     cycles, shot, settings = scene.cycles, scene.render, scene.render.image_settings
     cycles.device, cycles.use_denoising, scene.noisefloor.use = "CPU", True, False
@@ -102,11 +110,13 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
         one("loop", 0, seed)
         if done["search"]["found"]:
             one("tuned", done["search"]["found"], seed)
-        some(THRESHOLDS[:-1], seed)
+        if not small:
+            some(THRESHOLDS[:-1], seed)
     one("samples", reference, 77)
     for seed in range(1, seeds + 1):
         some(THRESHOLDS[-1:], seed)
-    some(SAMPLES, 1)
+    if not small:
+        some(SAMPLES, 1)
 
 
 def label(name):
@@ -116,7 +126,8 @@ def label(name):
     return named + (", Cycles' default" if (kind, value) == ("threshold", "0.01") else "")
 
 
-def measure(folders):
+def losses(folder):
+    """By the names of settings: what the worst square has lost, for each seed."""
     import numpy
     import pycvvdp
     from PIL import Image
@@ -129,32 +140,57 @@ def measure(folders):
     def places(side):
         return [*range(0, max(side - 64, 0), 64), max(side - 64, 0)]
 
+    def worst(path):
+        picture = read(path)
+        squares = [(slice(y, y + 64), slice(x, x + 64)) for y in places(picture.shape[0]) for x in places(picture.shape[1])]
+        return max(10 - float(metric.predict(picture[s], reference[s], dim_order="HWC")[0]) for s in squares)
+
+    reference, found = read(next(folder.glob("samples-*-77.png"))), {}
+    for path in sorted(folder.glob("*-[12].png")):
+        found.setdefault(path.stem[:-2], []).append(worst(path))
+    return found
+
+
+def seconds(done, setting):
+    """What a render with this setting takes, on average over seeds."""
+    return f"{statistics.mean(done[each]['user'] for each in done if each[:-2] == setting):.3g}"
+
+
+def jods(lost):
+    return f"{statistics.mean(lost):.2f}" + (f" ({max(lost):.2f})" if len(lost) > 1 else "")
+
+
+def measure(folders):
     rows, heads, table = {}, [], "blender"
     for folder in map(pathlib.Path, folders):
-        done = json.loads((folder / "times.json").read_text())
+        done, lost = json.loads((folder / "times.json").read_text()), losses(folder)
         table = "blender" if done["device"] == "CPU" else "blender-gpu"
-        reference = read(next(folder.glob("samples-*-77.png")))
         print(f"{folder.name}: {done['search']}", file=sys.stderr)
         heads += [f"{folder.name}: seconds", f"{folder.name}: JOD lost"]
         for name in [name[:-2] for name in done if name.endswith("-1")]:
-            lost = []
-            for path in sorted(folder.glob(f"{name}-[12].png")):
-                picture = read(path)
-                squares = [(slice(y, y + 64), slice(x, x + 64)) for y in places(picture.shape[0]) for x in places(picture.shape[1])]
-                lost.append(max(10 - float(metric.predict(picture[s], reference[s], dim_order="HWC")[0]) for s in squares))
             row = rows.setdefault(label(name + "-1"), {})
-            row[heads[-2]] = f"{numpy.mean([done[each]['user'] for each in done if each[:-2] == name]):.3g}"
-            row[heads[-1]] = f"{numpy.mean(lost):.2f}" + (f" ({max(lost):.2f})" if len(lost) > 1 else "")
+            row[heads[-2]], row[heads[-1]] = seconds(done, name), jods(lost[name])
     print(f"### {table}\n| | " + " | ".join(heads) + " |\n" + "|---" * (len(heads) + 1) + "|")
     for name, row in rows.items():
         print(f"| {name} | " + " | ".join(row.get(head, "") for head in heads) + " |")
+
+
+def small(folders):
+    print("### blender-small\n| | threshold found | search, seconds | frame: seconds, JOD | Cycles' default | the loop |\n|---|---|---|---|---|---|")
+    for folder in map(pathlib.Path, folders):
+        done, lost = json.loads((folder / "times.json").read_text()), losses(folder)
+        found, cells = done["search"]["found"], []
+        for setting in (f"tuned-{found or 0:g}", "threshold-0.01", "loop-0"):
+            cells.append(f"{seconds(done, setting)}, {jods(lost[setting])}" if setting in lost else "none")
+        search = f"{found:.3g}" if found else "none", f"{done['search']['user']:.3g}"
+        print(f"| {folder.name} | " + " | ".join([*search, *cells]) + " |")
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["render"]:
         addon, scene, size, folder, *more = sys.argv[2:]
         render(addon, scene, size, folder, *more)
-    elif sys.argv[1:2] == ["measure"]:
-        measure(sys.argv[2:])
+    elif sys.argv[1:2] in (["measure"], ["small"]):
+        globals()[sys.argv[1]](sys.argv[2:])
     else:
         raise SystemExit(__doc__)

@@ -87,6 +87,21 @@ def mean(parts):
     return total / numpy.maximum(count, 1), count
 
 
+def looked_up(table, radiance):
+    """What a table shows, (n, 3): where its manual says that a radiance lies, interpolated without its code."""
+    table, toe, top = table.__getnewargs__()
+    floor = numpy.floor(numpy.log2(1 + radiance / toe))
+    stops = floor + (1 + radiance / toe) / 2**floor - 1
+    last, whole = len(table) - 1, numpy.floor(numpy.log2(1 + top / toe))
+    place = numpy.minimum(stops / (whole + (1 + top / toe) / 2**whole - 1) * last, last)
+    low = numpy.minimum(place.astype(int), last - 1)
+    share, found = place - low, 0
+    for corner in numpy.ndindex(2, 2, 2):
+        red, green, blue = (low + corner).T
+        found = found + numpy.where(corner, share, 1 - share).prod(axis=1, keepdims=True) * table[blue, green, red]
+    return found
+
+
 def facts(scene):
     """All that is set of a scene's rendering."""
     found = {}
@@ -746,24 +761,13 @@ class Addon(unittest.TestCase):
         image.pixels.foreach_set(radiance.ravel())
         for transform, exposure, gamma in [("Standard", 0, 1), ("Filmic", 2, 1), (view.view_transform, -3, 1.2)]:
             view.view_transform, view.exposure, view.gamma = transform, exposure, gamma
-            table, toe, top = display.table(scene).__getnewargs__()
+            table = display.table(scene)
             kept = settings.file_format, settings.color_depth
             settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "8"
             image.save_render(str(FOLDER / "shown.png"), scene=scene)
             settings.file_format, settings.color_depth = kept
             shown = pixels(FOLDER / "shown.png")[::-1].reshape(-1, 4)[:, :3]
-            # Where the manual of the table says that a radiance lies; this interpolates on its own
-            floor = numpy.floor(numpy.log2(1 + radiance[:, :3] / toe))
-            stops = floor + (1 + radiance[:, :3] / toe) / 2**floor - 1
-            last = len(table) - 1
-            whole = numpy.floor(numpy.log2(1 + top / toe))
-            place = numpy.minimum(stops / (whole + (1 + top / toe) / 2**whole - 1) * last, last)
-            low = numpy.minimum(place.astype(int), last - 1)
-            share, found = place - low, 0
-            for corner in numpy.ndindex(2, 2, 2):
-                weight = numpy.where(corner, share, 1 - share).prod(axis=1, keepdims=True)
-                red, green, blue = (low + corner).T
-                found = found + weight * table[blue, green, red]
+            found = looked_up(table, radiance[:, :3])
             off = numpy.abs(found - shown) * 255
             self.assertLessEqual(numpy.median(off), 1, transform)
             self.assertLessEqual(numpy.quantile(off, 0.999), 3, transform)
@@ -814,6 +818,66 @@ class Addon(unittest.TestCase):
                     ratios.append(noisefloor.excess(*pair, params=params).ratio)
                 self.assertLess(ratios[0], 1.2)
                 self.assertGreater(ratios[1], 1.2)
+
+    def test_a_search_is_one_step_to_undo(self):
+        room().cycles.samples = 512
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            bpy.ops.ed.undo_push(message="before")
+            before = facts(bpy.context.scene)
+            self.assertEqual(bpy.ops.render.noisefloor_threshold("EXEC_DEFAULT", True), {"FINISHED"})
+            self.assertNotEqual(facts(bpy.context.scene), before)
+            bpy.ops.ed.undo()
+        self.assertEqual(facts(bpy.context.scene), before)
+
+    def test_a_search_that_is_stopped_leaves_all_as_it_was(self):
+        """By Esc, which ends a picture, and by the cross, after it."""
+        scene, operator = room(), tune.RENDER_OT_noisefloor_threshold
+        for stop in ("esc", "cross"):
+            before = facts(scene)
+            search = hooks.state.search = tune.Search(scene)
+            search.advance()
+            self.assertNotEqual(facts(scene), before)
+            self.assertEqual(bpy.ops.render.noisefloor_stop() if stop == "cross" else {"FINISHED"}, {"FINISHED"})
+            hooks.state.ended = "completed" if stop == "cross" else "cancelled"
+            context = types.SimpleNamespace(
+                screen=types.SimpleNamespace(areas=[]),
+                workspace=types.SimpleNamespace(status_text_set=lambda text: None),
+                window_manager=types.SimpleNamespace(event_timer_remove=lambda timer: None),
+            )
+            own = types.SimpleNamespace(search=search, timer=None)
+            own.end = types.MethodType(operator.end, own)
+            self.assertEqual(operator.modal(own, context, types.SimpleNamespace(type="TIMER")), {"CANCELLED"})
+            self.assertIsNone(hooks.state.search)
+            self.assertEqual(facts(scene), before)
+
+    def test_shots_of_all_kinds_are_searched_rendered_and_judged_as_they_are_shown(self):
+        for name, make in scenes.SCENES.items():
+            with self.subTest(scene=name):
+                scene = make()
+                scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.seed = 1024, True, 3
+                scene.render.filepath, shot = str(FOLDER / f"{name}.png"), scene.render.image_settings
+                shot.file_format, shot.color_mode, shot.color_depth = "PNG", "RGB", "16"
+                before = facts(scene)
+                self.assertEqual(bpy.ops.render.noisefloor_threshold(), {"FINISHED"})
+                after = facts(scene)
+                changed = {key for key in before if before[key] != after[key]}
+                self.assertLessEqual(changed, {("cycles", "adaptive_threshold"), ("cycles", "use_adaptive_sampling")})
+                self.assertEqual("is the hardest of 2, at 24 frames" in hooks.state.summary, name == "film")
+                scene.noisefloor.use, before = True, after | {("noisefloor", "use"): True}
+                with Passes() as loop:
+                    bpy.ops.render.render(write_still=True)
+                self.assertRegex(hooks.state.summary, r"^(\d+) of \1 squares without anything wrong")
+                self.assertEqual(facts(scene), before)
+                self.assertEqual(sorted(loop.made), sorted(layer.name for layer in scene.view_layers))
+                if name == "layers":
+                    continue  # What the compositor makes of them is not judged
+                (made,) = loop.made.values()
+                shown, _ = noisefloor.read(scene.render.filepath)
+                found = looked_up(display.table(scene), numpy.maximum(made["Combined"][..., :3].reshape(-1, 3), 0))
+                off = numpy.abs(found - shown[::-1].reshape(-1, 3) / 65535) * 255
+                self.assertLessEqual(numpy.median(off), 1, name)
+                # Colours that the display lacks meet its edge between the table's entries
+                self.assertLessEqual(numpy.quantile(off, 0.99), 6 if name in ("acescg", "rec2020") else 4, name)
 
     def test_drivers_and_keys_of_what_is_borrowed_change_nothing(self):
         found, said = [], []
@@ -1120,9 +1184,10 @@ def drawn(scene):
 
 arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
 zipfile.ZipFile(arguments[0]).extractall(FOLDER)
-sys.path.insert(0, str(FOLDER))
+sys.path[:0] = [str(FOLDER), str(pathlib.Path(__file__).resolve().parent)]
 import noisefloor_addon
 import noisefloor
+import scenes
 from noisefloor_addon import compositor, denoise, display, frame, hooks, judging, passes, sampling, settings, tune
 
 noisefloor_addon.register()

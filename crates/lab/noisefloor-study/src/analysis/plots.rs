@@ -26,9 +26,8 @@ fn failed(error: impl std::fmt::Display) -> StudyError {
 
 /// Labels of a logarithmic axis, none of which touch: 1, 2, 3 and 5 times a power of ten, or all digits where little is covered.
 fn ticks(covered: &Range<f64>) -> Vec<f64> {
-    let all = covered.end / covered.start < 6.0;
-    let digits = (1..10).filter(|digit| all || [1, 2, 3, 5].contains(digit)).map(f64::from);
-    // plotters has none below the first power of ten
+    let is_plain = |digit: &i32| covered.end < 6.0 * covered.start || [1, 2, 3, 5].contains(digit);
+    let digits = (1..10).filter(is_plain).map(f64::from);
     let powers = (0..=covered.end.log10() as i32).map(|power| 10f64.powi(power));
     let every = powers.flat_map(|power| digits.clone().map(move |digit| digit * power));
     every.filter(|spp| (covered.start..=covered.end).contains(spp)).collect()
@@ -42,8 +41,7 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
     });
     let (low, high) = all.fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v.max(0.1)), h.max(v)));
     let shown = low / 1.2..high * 1.2;
-    let named: Vec<f64> =
-        (0..tiles.len()).step_by(tiles.len().div_ceil(24).max(1)).map(|tile| tile as f64).collect();
+    let labels = ticks(&shown);
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
@@ -52,17 +50,19 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
             .margin(12)
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d(
-                (-0.5..tiles.len() as f64 - 0.5).with_key_points(named),
-                shown.clone().log_scale().with_key_points(ticks(&shown)),
-            )
+            .build_cartesian_2d(-0.5..tiles.len() as f64 - 0.5, shown.log_scale().with_key_points(labels))
             .map_err(failed)?;
         chart
             .configure_mesh()
             .disable_x_mesh()
+            .x_labels((2 * tiles.len()).clamp(2, 24))
             .x_desc("tile, in the order of tiles.csv (blue: mean; red: 95 % see no difference)")
             .y_desc("samples per pixel")
-            .x_label_formatter(&|tile| format!("{tile:.0}"))
+            // Only where there is a tile
+            .x_label_formatter(&|x| match (x.round() - x).abs() < 1e-6 {
+                true => format!("{}", x.round() as i64),
+                false => String::new(),
+            })
             .y_label_formatter(&|spp| format!("{spp:.0}"))
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
