@@ -8,7 +8,6 @@ import json
 import math
 import os
 import pathlib
-import random
 import re
 import resource
 import statistics
@@ -291,7 +290,6 @@ def on_black():
     table("on-black", ["samples", "with its exposure given"], rows)
 
 
-<<<<<<< Updated upstream
 # Runs the host of the denoiser, and writes how many pictures each call had, and the processor time before and after
 TIMED = """#!{python} -u
 import os, runpy, sys, time
@@ -345,21 +343,6 @@ def hard():
     # Verdicts count the mean of four mirror images as 0.97
     rows = [[scene, lost(scene, "estimate", 0.97), lost(scene, "true"), lost(scene, "true_denoised")] for scene in sorted({r["scene"] for r in kept})]
     table("hard", ["estimated", "lost", "against denoised references"], rows)
-=======
-def audits():
-    """Which share of places keeps the limit of an audit, in renders of our own; between brackets, of 95 in 100 draws of as many scenes."""
-    lost = {}
-    for scene in re.findall(r"^  (\S+)", run(NOISEFLOOR, "scenes").partition("Stiff")[0], re.MULTILINE):
-        for seed in range(1, 6):
-            audit = rendered(scene, "--size", "128x128", "--seed", seed, "--audit", "8")[0]["audit"]
-            lost.setdefault(scene, []).extend(place["jods_lost"] for place in audit["places"])
-    kept = lambda scenes: statistics.mean(jods <= audit["limit"] for scene in scenes for jods in lost[scene])
-    draw = random.Random(1).choices
-    drawn = statistics.quantiles((kept(draw(list(lost), k=len(lost))) for _ in range(10_000)), n=40)
-    every = sum(lost.values(), [])
-    print(f"audits.places: {len(every)}\naudits.kept: {share(kept(lost))} ({share(drawn[0])} to {share(drawn[-1])})")
-    print(f"audits.worst: {max(every):.2f}")
->>>>>>> Stashed changes
 
 
 def audits():
