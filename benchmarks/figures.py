@@ -290,6 +290,34 @@ def on_black():
     table("on-black", ["samples", "with its exposure given"], rows)
 
 
+ROOM = """<scene version="3.0.0"><integrator type="path"/>
+<sensor type="perspective"><float name="fov" value="45"/><transform name="to_world"><lookat origin="0,1,3.4" target="0,1,0" up="0,1,0"/></transform></sensor>
+<shape type="rectangle"><transform name="to_world"><scale x="3" y="3"/><rotate x="1" angle="-90"/></transform></shape>
+<shape type="rectangle"><transform name="to_world"><scale x="3" y="3"/><translate z="-1"/></transform></shape>
+<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="90"/><translate y="3" z="0.5"/></transform>
+<emitter type="area"><rgb name="radiance" value="3,3,3"/></emitter></shape>
+<shape type="sphere"><point name="center" x="0.4" y="0.8" z="0"/><float name="radius" value="0.25"/><bsdf type="dielectric"/></shape>
+<shape type="sphere"><point name="center" x="0.4" y="0.8" z="0"/><float name="radius" value="0.03"/>
+<emitter type="area"><rgb name="radiance" value="LAMP"/></emitter></shape></scene>"""
+
+
+def coloured():
+    """What a room has lost where it stops, by the colour of a small lamp in glass, against 6,000 samples of another seed. Needs what
+    look.py needs; $NOISEFLOOR_OIDN_PYTHON has Open Image Denoise."""
+    rows, lamps = [], {"white": "20,20,20", "red": "60,0,0", "green": "0,30,0", "blue": "0,0,200", "magenta": "60,0,200"}
+    for name in (*lamps, "blue, denoised"):
+        with tempfile.TemporaryDirectory() as out:
+            pathlib.Path(out, "room.xml").write_text(ROOM.replace("LAMP", lamps[name.partition(",")[0]]))
+            words = [NOISEFLOOR, "render", f"{out}/room.xml", "--size", "96x96", "--tile", "32", "--quiet", "--out"]
+            run(*words, f"{out}/stopped", "--seed", "3", *(["--denoise", "oidn"] if "," in name else []))
+            run(*words, f"{out}/reference", "--criterion", "spp:6000", "--seed", "99")
+            report = json.loads(pathlib.Path(out, "stopped/report.json").read_text())
+            seen = run(sys.executable, "benchmarks/look.py", "picture", f"{out}/stopped", f"{out}/reference")
+            lost = re.search(r"as it is \| (\S+)" if "," in name else r"scaled \| (\S+)", seen)[1]
+            rows.append([name, f"{report['samples'] / (report['width'] * report['height']):.0f}", lost])
+    table("coloured", ["samples", "JOD lost by the worst window of 64 pixels"], rows)
+
+
 # Runs the host of the denoiser, and writes how many pictures each call had, and the processor time before and after
 TIMED = """#!{python} -u
 import os, runpy, sys, time

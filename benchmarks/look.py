@@ -24,8 +24,10 @@ WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 def load(name):
     """Linear RGB and samples of each pixel."""
     folder = pathlib.Path(name)
-    path, _, spp = (str(folder / "image.exr"), "", None) if folder.is_dir() else name.rpartition(":")
-    if not folder.is_dir():
+    if folder.is_dir():
+        finished = folder / "image-denoised.exr"
+        path, spp = str(finished if finished.exists() else folder / "image.exr"), None
+    else:
         path, spp = name.rsplit(":", 1)
     with OpenEXR.File(path) as file:
         channels = {key: channel.pixels for part in file.parts for key, channel in part.channels.items()}
