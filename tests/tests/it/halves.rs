@@ -133,9 +133,9 @@ fn exchanged_halves_are_judged_alike() {
     assert!(judged > 150, "{judged} tiles were judged");
 }
 
-/// A picture and its three mirror images are as noisy as each other, whether dots lie in odd or even columns and rows: within 1 % in
-/// the median without dots, within 8 % with a few of them and 10 % with one, and within 15 % at most. With one pyramid it was 18 % and 44 %. Sides are
-/// multiples of tiles, which mirror onto each other.
+/// A picture and its three mirror images are as noisy as each other, whether dots lie in odd or even columns and rows: within
+/// 1 % in the median without dots, within 8 % with a few of them and 10 % with one, and within 15 % at most; the bounds with
+/// dots are what was found, rounded up. Sides are multiples of tiles, which mirror onto each other.
 #[test]
 fn mirrored_pictures_are_judged_alike() {
     let mirror = |pixel: usize, image: usize| {
