@@ -1,10 +1,10 @@
-"""Records what ColorVideoVDP says of the pairs of pictures in tests/cvvdp.rs, into tests/cvvdp.json.
+"""Records what ColorVideoVDP says of the pairs of pictures and the films that tests/cvvdp.json lists, into that file.
 
     pip install cvvdp==0.5.7
     python crates/noisefloor-vision/tests/record_cvvdp.py
 
-Pairs that the file has already are kept if they were recorded with the same versions; delete the file to
-record all of them again. The pictures are integers out of integers, so that both languages see the same ones.
+Those that were recorded with the same versions are kept; to add one, write it into the file without results, as
+`picture` and `metric` take it. The pictures are integers out of integers, so that both languages see the same ones.
 """
 
 import json
@@ -21,6 +21,8 @@ from pycvvdp.display_model import vvdp_display_geometry, vvdp_display_photo_eotf
 from pycvvdp.video_source import video_source_array
 
 U = np.uint32
+# What is recorded of a pair, and of a film: a still view whose noise of `amount` is new in each frame, and that of `standing` is not
+PAIR, FILM = {"jod", "mean", "rms", "sample"}, {"video", "by_frame", "map_rms"}
 
 
 def hashed(x, y, channel, seed):
@@ -130,74 +132,6 @@ def metric(viewing):
     return Recorder(**display, heatmap="raw", device=torch.device("cpu"), quiet=True)
 
 
-def cases():
-    """All pairs, as keyword arguments of `picture`."""
-    base = dict(
-        width=128, height=128, pattern="bowl", low=[20, 20, 20], high=[220, 220, 220], amount=[12, 12, 12],
-        grain=1, grey=False, scale=1, seed=1, viewing="standard_fhd",
-    )  # fmt: skip
-
-    def vary(**changes):
-        seed = len(listed) + 1
-        listed.append({**base, "seed": seed, **changes})
-
-    listed = []
-    # Noise levels, grey and in colour, fine and coarse
-    for amount in (0, 1, 3, 8, 20, 60, 200):
-        vary(amount=[amount] * 3, grey=True)
-        vary(amount=[amount] * 3)
-    for grain in (2, 4, 8):
-        vary(grain=grain)
-    # Sizes: small, odd, even beside odd
-    small = ((2, 2), (3, 5), (4, 4), (7, 7), (8, 13), (13, 8), (15, 16), (16, 15), (33, 31), (65, 64))
-    large = ((64, 65), (127, 129), (128, 200), (160, 160), (192, 192), (255, 130), (301, 201))
-    for width, height in small + large:
-        vary(width=width, height=height, amount=[20] * 3)
-    # Bands that end with the lowest frequency instead of the size
-    vary(width=640, height=360, amount=[20] * 3)
-    near = "ppd=5,peak=200,contrast=1000,ambient=100,reflectivity=0.005,eotf=srgb"
-    vary(viewing=near, amount=[60] * 3, grain=3)
-    # Contents
-    for pattern in ("flat", "ramp", "bars", "disc", "mosaic"):
-        vary(pattern=pattern)
-        vary(pattern=pattern, low=[60] * 3, high=[90] * 3, amount=[6] * 3)
-    vary(low=[0, 0, 0], high=[6, 6, 6], amount=[3] * 3)
-    vary(low=[240, 240, 240], high=[255, 255, 255], amount=[8] * 3)
-    # Chroma
-    vary(low=[10, 60, 20], high=[200, 90, 40])
-    vary(low=[10, 10, 90], high=[40, 60, 240], amount=[0, 0, 30])
-    vary(low=[128] * 3, high=[128] * 3, amount=[15, 5, 0])
-    vary(pattern="disc", low=[200, 40, 40], high=[40, 200, 40], amount=[10] * 3)
-    # Displays
-    sdr = "standard_4k standard_phone standard_hmd sdr_4k_30 iphone_12_pro macbook_pro_16 lg_oled_2017_sdr"
-    hdr = "eizo_CG3146 standard_hdr_pq 65inch_hdr_pq_2Knit standard_hdr_hlg iphone_14_pro_hdr"
-    for viewing in sdr.split() + hdr.split():
-        vary(viewing=viewing, width=160, height=144)
-        vary(viewing=viewing, pattern="mosaic", high=[220, 180, 140], amount=[25] * 3)
-    for viewing in ("standard_hdr_linear", "standard_hdr_linear_dark", "standard_hdr_linear_zoom"):
-        for scale in (100, 3000):
-            vary(viewing=viewing, scale=scale)
-    for viewing in (
-        "ppd=10,peak=100,contrast=500,ambient=0,reflectivity=0.005,eotf=gamma2.2",
-        "ppd=30,peak=48,contrast=2000,ambient=0,reflectivity=0.01,eotf=gamma2.6",
-        "ppd=60,peak=300,contrast=1000,ambient=100,reflectivity=0.01,eotf=srgb",
-        "ppd=60,peak=400,contrast=1000,ambient=5000,reflectivity=0.02,eotf=srgb,primaries=rec2020",
-        "ppd=200,peak=1000,contrast=100000,ambient=10,reflectivity=0.005,eotf=srgb",
-    ):
-        vary(viewing=viewing, width=150, height=150, amount=[25] * 3)
-    # Primaries and whites
-    desk = "ppd=38,peak=200,contrast=1000,ambient=250,reflectivity=0.005,eotf="
-    chroma = dict(low=[128] * 3, high=[128] * 3, amount=[15, 5, 0])
-    for colours in ("primaries=p3", "white=d50", "primaries=rec2020,white=d93", "white=0.45:0.41"):
-        vary(viewing=f"{desk}srgb,{colours}", grey=True, amount=[25] * 3)
-        vary(viewing=f"{desk}srgb,{colours}", **chroma)
-    own = "primaries=0.67:0.32:0.22:0.7:0.14:0.05,white=0.29:0.31"
-    vary(viewing=f"{desk}gamma2.4,{own}", pattern="mosaic", high=[220, 180, 140], amount=[25] * 3)
-    vary(viewing=f"{desk}hlg,primaries=rec2020,white=d93", low=[10, 60, 20], high=[200, 90, 40])
-    vary(viewing=f"{desk}srgb,white=d50", pattern="flat")
-    return listed
-
-
 def record(case):
     """The case with its JOD, and of the map its mean, root mean square and an 8×8 sample, in JODs lost."""
     of = metric(case["viewing"])
@@ -215,30 +149,6 @@ def record(case):
         "rms": rounded(np.sqrt((lost**2).mean())),
         "sample": [rounded(value) for value in sample],
     }
-
-
-def films():
-    """Films of a still view with noise: `amount` is new in each frame, `standing` is the same in all of them."""
-    base = dict(
-        width=128, height=128, pattern="bowl", low=[40] * 3, high=[200] * 3, amount=[12] * 3, grain=1, grey=False,
-        scale=1, seed=1, viewing="standard_fhd", standing=[0] * 3, rate=24.0,
-    )  # fmt: skip
-    listed = []
-    for rate in (24.0, 25.0, 30.0, 60.0, 120.0):
-        listed.append(base | dict(rate=rate))
-        listed.append(base | dict(rate=rate, amount=[4] * 3, standing=[6] * 3, pattern="mosaic"))
-    for amount in (1, 4, 30):
-        listed.append(base | dict(amount=[amount] * 3))
-    for grain in (2, 4):
-        listed.append(base | dict(grain=grain, rate=60.0))
-    listed.append(base | dict(grey=True))
-    listed.append(base | dict(amount=[0] * 3, standing=[8] * 3))
-    listed.append(base | dict(low=[60, 30, 90], high=[120, 200, 140], amount=[3, 0, 20]))
-    listed.append(base | dict(width=301, height=201, pattern="bars"))
-    listed.append(base | dict(viewing="standard_4k"))
-    for number, case in enumerate(listed):
-        case["seed"] = 1000 * (number + 1)
-    return listed
 
 
 # Lengths of the filters that differences are averaged over, after one
@@ -287,27 +197,21 @@ def film(case):
     }
 
 
-def key(pair):
-    """What was compared, without the results."""
-    results = ("jod", "mean", "rms", "sample")
-    return json.dumps({name: value for name, value in pair.items() if name not in results}, sort_keys=True)
-
-
 def main():
     torch.set_num_threads(1)
     path = Path(__file__).with_name("cvvdp.json")
-    versions = {name: version(name) for name in ("cvvdp", "torch", "torchvision", "numpy")}
-    head = {"python": platform.python_version(), **versions}
-    before = json.loads(path.read_text()) if path.exists() else {}
-    kept = before["pairs"] if before.get("versions") == head else []
-    known = {key(pair): pair for pair in kept}
-    recorded = [known.get(key(case)) or record(case) for case in cases()]
-    lines = lambda cases: ",\n".join(json.dumps(case, separators=(",", ":")) for case in cases)
-    path.write_text(
-        f'{{"versions": {json.dumps(head)}, "pairs": [\n{lines(recorded)}\n],\n"films": [\n'
-        f'{lines(map(film, films()))}\n]}}\n'
-    )
-    print(f"{len(recorded)} pairs, {sum(key(case) in known for case in recorded)} of them from before")
+    head = {"python": platform.python_version()} | {name: version(name) for name in ("cvvdp", "torch", "torchvision", "numpy")}
+    before = json.loads(path.read_text())
+    parts = {"versions": json.dumps(head)}
+    for name, results, measure in [("pairs", PAIR, record), ("films", FILM, film)]:
+        lines = []
+        for case in before[name]:
+            if before["versions"] != head or not results <= case.keys():
+                case = measure({key: value for key, value in case.items() if key not in results})
+            lines.append(json.dumps(case, separators=(",", ":")))
+        parts[name] = "[\n" + ",\n".join(lines) + "\n]"
+    path.write_text('{{"versions": {versions}, "pairs": {pairs},\n"films": {films}}}\n'.format(**parts))
 
 
-main()
+if __name__ == "__main__":
+    main()
