@@ -7,7 +7,6 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__: list[str]
 __version__: str
 
 class Error(Exception): ...
