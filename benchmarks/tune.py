@@ -6,8 +6,8 @@ for docs/benchmarks/blender.md.
     tune.py measure FOLDER...                                                       pip install cvvdp pillow
     tune.py small FOLDER...
 
-SCENE is a .blend file, a script, or one of several in a script, as in scenes.py:hair, of which only what is found, Cycles' default and the
-loop are rendered; `small` has the table of these.
+SCENE is a .blend file or one of the add-on's, as in scenes.py:hair. Of its small ones, only what is found, Cycles' default and the loop
+are rendered; `small` has the table of these.
 
 `render` writes what Blender shows (view transform included) as PNGs of 16 bits, denoised by Cycles' own Open Image
 Denoise, two seeds a setting unless said otherwise, beside times.json with the processor seconds of each render and of the search,
@@ -23,6 +23,8 @@ import sys
 import tempfile
 import time
 import zipfile
+
+from figures import table
 
 THRESHOLDS = [("threshold", t) for t in (0.2, 0.1, 0.05, 0.03, 0.01)]
 SAMPLES = [("samples", n) for n in (64, 256)]
@@ -41,11 +43,11 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
     import noisefloor_addon
 
     noisefloor_addon.register()
-    path, _, small = path.partition(":")
-    if small:
-        runpy.run_path(path)["SCENES"][small]()
-    elif path.endswith(".py"):
-        runpy.run_path(path)
+    path, _, name = path.partition(":")
+    scenes = runpy.run_path(path) if name else {"SCENES": ()}
+    small = name in scenes["SCENES"]
+    if name:
+        scenes["SCENES" if small else "LARGER"][name]()
     else:
         bpy.ops.wm.open_mainfile(filepath=path)
     scene = bpy.context.scene
@@ -89,6 +91,10 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
         times.write_text(json.dumps(done, indent=1))
         print(name, done[name], flush=True)
 
+    def some(chosen, seed):
+        for kind, value in chosen:
+            one(kind, value, seed)
+
     if "search" not in done:
         cycles.use_adaptive_sampling, cycles.seed, cycles.adaptive_threshold, cycles.samples = True, 3, 0.01, 4096
         before = used()
@@ -101,9 +107,6 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
         done["search"] = {"user": used() - before, "found": found, "said": noisefloor_addon.hooks.state.summary}
         times.write_text(json.dumps(done, indent=1))
         print("search", done["search"], flush=True)
-    def some(chosen, seed):
-        for kind, value in chosen:
-            one(kind, value, seed)
 
     # The dear ones last, so that an interrupted run has the others of both seeds
     for seed in range(1, seeds + 1):
@@ -161,29 +164,27 @@ def jods(lost):
 
 
 def measure(folders):
-    rows, heads, table = {}, [], "blender"
+    rows, heads, name = {}, [], "blender"
     for folder in map(pathlib.Path, folders):
         done, lost = json.loads((folder / "times.json").read_text()), losses(folder)
-        table = "blender" if done["device"] == "CPU" else "blender-gpu"
+        name = "blender" if done["device"] == "CPU" else "blender-gpu"
         print(f"{folder.name}: {done['search']}", file=sys.stderr)
         heads += [f"{folder.name}: seconds", f"{folder.name}: JOD lost"]
-        for name in [name[:-2] for name in done if name.endswith("-1")]:
-            row = rows.setdefault(label(name + "-1"), {})
-            row[heads[-2]], row[heads[-1]] = seconds(done, name), jods(lost[name])
-    print(f"### {table}\n| | " + " | ".join(heads) + " |\n" + "|---" * (len(heads) + 1) + "|")
-    for name, row in rows.items():
-        print(f"| {name} | " + " | ".join(row.get(head, "") for head in heads) + " |")
+        for setting in [each[:-2] for each in done if each.endswith("-1")]:
+            row = rows.setdefault(label(setting + "-1"), {})
+            row[heads[-2]], row[heads[-1]] = seconds(done, setting), jods(lost[setting])
+    table(name, heads, [[setting, *(row.get(head, "") for head in heads)] for setting, row in rows.items()])
 
 
 def small(folders):
-    print("### blender-small\n| | threshold found | search, seconds | frame: seconds, JOD | Cycles' default | the loop |\n|---|---|---|---|---|---|")
+    rows = []
     for folder in map(pathlib.Path, folders):
         done, lost = json.loads((folder / "times.json").read_text()), losses(folder)
-        found, cells = done["search"]["found"], []
+        found = done["search"]["found"]
+        rows.append([folder.name, f"{found:.3g}" if found else "none", f"{done['search']['user']:.3g}"])
         for setting in (f"tuned-{found or 0:g}", "threshold-0.01", "loop-0"):
-            cells.append(f"{seconds(done, setting)}, {jods(lost[setting])}" if setting in lost else "none")
-        search = f"{found:.3g}" if found else "none", f"{done['search']['user']:.3g}"
-        print(f"| {folder.name} | " + " | ".join([*search, *cells]) + " |")
+            rows[-1].append(f"{seconds(done, setting)}, {jods(lost[setting])}" if setting in lost else "none")
+    table("blender-small", ["threshold found", "search, seconds", "frame: seconds, JOD", "Cycles' default", "the loop"], rows)
 
 
 if __name__ == "__main__":

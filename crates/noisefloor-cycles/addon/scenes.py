@@ -1,7 +1,9 @@
-"""Eight small scenes for Cycles, which test_addon.py and benchmarks/tune.py render: SCENES[name]() makes one.
+"""Scenes for Cycles: SCENES[name]() makes one of eight small ones, which test_addon.py and benchmarks/tune.py render, and
+LARGER[name]() one that benchmarks/tune.py alone does.
 
 Each has what shots have and a cube on a plane has not. What a version of Blender lacks is left out."""
 
+import math
 import random
 
 import bpy
@@ -16,10 +18,11 @@ def scene(view, working="Linear Rec.709", sky=(0.4, 0.5, 0.7), strength=0.3):
     made = bpy.context.scene
     made.render.engine, made.view_settings.view_transform = "CYCLES", view
     made.render.resolution_x, made.render.resolution_y, made.render.resolution_percentage = 96, 64, 100
-    made.world = bpy.data.worlds.new("sky")
-    made.world.use_nodes = True
-    back = made.world.node_tree.nodes["Background"].inputs
-    back["Color"].default_value, back["Strength"].default_value = (*sky, 1), strength
+    if sky:
+        made.world = bpy.data.worlds.new("sky")
+        made.world.use_nodes = True
+        back = made.world.node_tree.nodes["Background"].inputs
+        back["Color"].default_value, back["Strength"].default_value = (*sky, 1), strength
     return made
 
 
@@ -66,6 +69,11 @@ def lamp(kind, at, to, energy, colour=(1, 1, 1), **more):
     for name, value in more.items():
         setattr(data, name, value)
     return aimed(data, at, to)
+
+
+def turned(made, *degrees):
+    made.rotation_euler = [math.radians(angle) for angle in degrees]
+    return made
 
 
 def camera(at, to, lens):
@@ -217,6 +225,122 @@ def leaves():
     return made
 
 
+def striped(look, kind, colours, **inputs):
+    """Colours a material by a texture between two colours."""
+    tree = look.node_tree
+    texture, ramp = tree.nodes.new(kind), tree.nodes.new("ShaderNodeValToRGB")
+    for name, value in inputs.items():
+        texture.inputs[name].default_value = value
+    for element, colour in zip(ramp.color_ramp.elements, colours):
+        element.color = (*colour, 1)
+    tree.links.new(texture.outputs[0], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    return look
+
+
+def outdoor():
+    """A sun, a sky, a lawn and a few blocks."""
+    made, dice = scene("AgX", sky=(0.45, 0.65, 1), strength=0.8), random.Random(4)
+    turned(lamp("SUN", (0, 0, 0), (0, 0, -1), 4, (1, 0.93, 0.8), angle=math.radians(2)), 50, 0, 35)
+    lawn = material((0.1, 0.2, 0.05), Roughness=1)
+    add("plane", striped(lawn, "ShaderNodeTexNoise", [(0.02, 0.06, 0.01), (0.2, 0.35, 0.08)], Scale=30, Detail=8), (0, 0, 0), size=60)
+    plaster, brick = material((0.8, 0.75, 0.65), Roughness=0.9), material((0.5, 0.2, 0.13), Roughness=0.8)
+    looks = [plaster, brick, material((0.5, 0.5, 0.55), Roughness=0.25)]
+    for k in range(9):
+        height = dice.uniform(0.8, 3.5)
+        at = ((k % 3 - 1) * 2.6 + dice.uniform(-0.4, 0.4), (k // 3) * 2.6, height / 2)
+        add("cube", looks[k % 3], at, (1.3, 1.3, height), size=1, rotation=(0, 0, dice.uniform(0, 1.5)))
+    camera((0.5, -8, 2.6), (0, 0, 0), 50).angle = math.radians(50)
+    turned(made.camera, 83, 0, 0)
+    return made
+
+
+def shelf():
+    """A still life: varnished wood, brushed metal, glass, cloth and wax under two soft lamps."""
+    made, dice = scene("AgX", sky=None), random.Random(7)
+    turned(lamp("AREA", (-2.5, -2, 3.5), (0, 0, 0), 160, size=1.2), 40, 0, -50)
+    turned(lamp("AREA", (3, -2.5, 2), (0, 0, 0), 40, size=2.5), 60, 0, 50)
+    wood = material((0.3, 0.15, 0.06), Roughness=0.3, Coat_Weight=0.5)
+    striped(wood, "ShaderNodeTexWave", [(0.12, 0.05, 0.02), (0.4, 0.22, 0.1)], Scale=3, Distortion=6)
+    add("cube", wood, (0, 0, -0.05), (6, 3, 0.1), size=1)
+    add("cube", material((0.7, 0.68, 0.65), Roughness=0.95), (0, 1.6, 2), (8, 0.1, 4.2), size=1)
+    looks = [
+        material((0.8, 0.6, 0.25), Metallic=1.0, Roughness=0.25),
+        material((1, 1, 1), Roughness=0.02, Transmission_Weight=1.0, IOR=1.5),
+        material((0.15, 0.2, 0.5), Roughness=1.0, Sheen_Weight=1.0),
+        material((0.9, 0.75, 0.55), Roughness=0.5, Subsurface_Weight=1.0),
+    ]
+    for k in range(8):
+        radius = dice.uniform(0.18, 0.38)
+        at = (-1.6 + 0.46 * k, dice.uniform(-0.5, 0.8), radius)
+        add("uv_sphere", looks[k % 4], at, segments=48, ring_count=24, radius=radius)
+        bpy.ops.object.shade_smooth()
+    camera((0, -5, 1.9), (0, 0, 0), 50).angle = math.radians(38)
+    turned(made.camera, 75, 0, 0)
+    return made
+
+
+def translucent(colour, through):
+    """Leaves: two fifths of the light go through, with a colour of their own."""
+    made = material(colour, Roughness=0.5)
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    behind, mixed = nodes.new("ShaderNodeBsdfTranslucent"), nodes.new("ShaderNodeMixShader")
+    behind.inputs["Color"].default_value, mixed.inputs[0].default_value = (*through, 1), 0.4
+    links.new(nodes["Principled BSDF"].outputs[0], mixed.inputs[1])
+    links.new(behind.outputs[0], mixed.inputs[2])
+    links.new(mixed.outputs[0], nodes["Material Output"].inputs["Surface"])
+    return made
+
+
+def mesh(polygons, look):
+    """Polygons of as many corners each, as one object."""
+    made = bpy.data.meshes.new("mesh")
+    corners = len(polygons[0])
+    faces = [tuple(range(at, at + corners)) for at in range(0, corners * len(polygons), corners)]
+    made.from_pydata([corner for polygon in polygons for corner in polygon], [], faces)
+    made.materials.append(look)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("mesh", made))
+
+
+def garden():
+    """A lawn of blades, bushes of leaves that light shines through, and a ball that flies by, with motion blur and depth of
+    field."""
+    made, dice = scene("AgX", sky=(0.5, 0.68, 1), strength=0.7), random.Random(11)
+    turned(lamp("SUN", (0, 0, 0), (0, 0, -1), 6, (1, 0.9, 0.75), angle=math.radians(0.6)), 55, 0, -40)
+    add("plane", material((0.05, 0.035, 0.02), Roughness=1.0), (0, 0, 0), size=40)
+    blades = []
+    for _ in range(60000):
+        x, y = dice.uniform(-4, 4), dice.uniform(-2, 7)
+        turn, height, bend = dice.uniform(0, math.tau), dice.uniform(0.06, 0.14), dice.uniform(0.01, 0.06)
+        along, across = (math.cos(turn), math.sin(turn)), (-math.sin(turn) * 0.005, math.cos(turn) * 0.005)
+        ground = (x - across[0], y - across[1], 0), (x + across[0], y + across[1], 0)
+        blades.append([*ground, (x + along[0] * bend, y + along[1] * bend, height)])
+    mesh(blades, translucent((0.06, 0.14, 0.02), (0.15, 0.3, 0.03)))
+    for middle, radius, colour in [((-1.5, 3.0, 0.8), 0.9, 0.0), ((0.4, 4.6, 0.9), 1.1, 0.04), ((2.2, 3.2, 0.6), 0.75, 0.02)]:
+        bush = []
+        for _ in range(9000):
+            # Leaves are near the outside of a bush
+            way = [dice.gauss(0, 1) for _ in range(3)]
+            far = radius * dice.uniform(0.6, 1.0) / math.sqrt(sum(part**2 for part in way))
+            at = [m + far * part for m, part in zip(middle, way)]
+            if at[2] >= 0:
+                one, other = ([dice.gauss(0, 0.03) for _ in range(3)] for _ in range(2))
+                corners = ((-1, 0), (0, -1), (1, 0), (0, 1))
+                bush.append([[x + a * p + b * q for x, p, q in zip(at, one, other)] for a, b in corners])
+        mesh(bush, translucent((0.05 + colour, 0.13, 0.03), (0.2 + colour, 0.35, 0.04)))
+    ball = add("uv_sphere", material((0.7, 0.08, 0.05), Roughness=0.4), (0, 0, 0), segments=48, ring_count=24, radius=0.16)
+    bpy.ops.object.shade_smooth()
+    for frame, ball.location in [(0, (-0.15, 1.0, 0.75)), (2, (0.55, 1.0, 0.9))]:
+        ball.keyframe_insert("location", frame=frame)
+    made.frame_set(1)
+    made.render.use_motion_blur = True
+    own = camera((0.2, -2.2, 0.8), (0, 0, 0), 50)
+    own.angle, own.dof.use_dof, own.dof.focus_distance, own.dof.aperture_fstop = math.radians(50), True, 3.2, 0.8
+    turned(made.camera, 85, 0, 0)
+    return made
+
+
+LARGER = {"outdoor": outdoor, "shelf": shelf, "garden": garden}
 SCENES = {
     "window": window,
     "hair": hair,
