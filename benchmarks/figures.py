@@ -224,16 +224,30 @@ def rendered(scene, *options):
 
 def first_picture():
     """What the Cornell box has lost where it stops, against 8,192 samples of another seed. Needs what look.py needs."""
+    import look
+    rows = []
     with tempfile.TemporaryDirectory() as out:
         size = ["--size", "384x384", "--tile", "64", "--quiet", "--force", "--out"]
         run(NOISEFLOOR, "render", "cornell-box", *size, f"{out}/stopped")
         run(NOISEFLOOR, "render", "cornell-box", "--criterion", "spp:8192", "--seed", "1098", *size, f"{out}/reference")
-        print(run(sys.executable, "benchmarks/look.py", "picture", f"{out}/stopped", f"{out}/reference"))
+        for name, scaled in (("scaled", True), ("as it is", False)):
+            rows.append([name, *(f"{number:.2f}" for number in look.picture(out, scaled))])
+    table("first-picture", ["JOD lost by the worst window of 64 pixels", "contrast in the worst window of 28"], rows)
 
 
 def people_lost():
     """What zones had lost where people stopped. Needs what look.py needs."""
-    print(run(sys.executable, "benchmarks/look.py", "people", HUMAN))
+    import look
+    rows, of_scenes = [], []
+    between = lambda values: f"({min(values):.2f} to {max(values):.2f})"
+    for scene, contrasts, crops, zones in look.people(HUMAN):
+        means = statistics.geometric_mean(contrasts), statistics.mean(crops), statistics.mean(zones)
+        rows.append([scene, f"{means[0]:.2f} {between(contrasts)}", f"{means[1]:.2f} {between(crops)}", f"{means[2]:.2f}"])
+        of_scenes.append(means)
+    contrasts, *jods = zip(*of_scenes)
+    means = statistics.geometric_mean(contrasts), *map(statistics.mean, jods)
+    rows.append(["mean (of contrast, geometric)", *(f"{mean:.2f}" for mean in means)])
+    table("people-lost", ["contrast, worst window of a zone", "JOD lost by its worst 64×64", "by the zone"], rows)
 
 
 def films():
@@ -304,6 +318,7 @@ ROOM = """<scene version="3.0.0"><integrator type="path"/>
 def coloured():
     """What a room has lost where it stops, by the colour of a small lamp in glass, against 6,000 samples of another seed. Needs what
     look.py needs; $NOISEFLOOR_OIDN_PYTHON has Open Image Denoise."""
+    import look
     rows, lamps = [], {"white": "20,20,20", "red": "60,0,0", "green": "0,30,0", "blue": "0,0,200", "magenta": "60,0,200"}
     for name in (*lamps, "blue, denoised"):
         with tempfile.TemporaryDirectory() as out:
@@ -312,9 +327,8 @@ def coloured():
             run(*words, f"{out}/stopped", "--seed", "3", *(["--denoise", "oidn"] if "," in name else []))
             run(*words, f"{out}/reference", "--criterion", "spp:6000", "--seed", "99")
             report = json.loads(pathlib.Path(out, "stopped/report.json").read_text())
-            seen = run(sys.executable, "benchmarks/look.py", "picture", f"{out}/stopped", f"{out}/reference")
-            lost = re.search(r"as it is \| (\S+)" if "," in name else r"scaled \| (\S+)", seen)[1]
-            rows.append([name, f"{report['samples'] / (report['width'] * report['height']):.0f}", lost])
+            lost, _ = look.picture(out, scaled="," not in name)
+            rows.append([name, f"{report['samples'] / (report['width'] * report['height']):.0f}", f"{lost:.2f}"])
     table("coloured", ["samples", "JOD lost by the worst window of 64 pixels"], rows)
 
 

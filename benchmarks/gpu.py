@@ -4,8 +4,7 @@
     python3 benchmarks/gpu.py [--sizes 1920x1080,3840x2160] [--renderers cuda,cornell] [--tile 64] [--limit 2048]
 
 Needs a machine with an NVIDIA card, the module `noisefloor`, and CuPy (`cuda`) or Mitsuba 3 (`cornell`, or the path of a
-scene of Mitsuba). `--renderers paced` needs no card: it takes time, but no processor until a picture is fetched, which is light
-with noise that nobody could overlook, so that all tiles stop at the limit.
+scene of Mitsuba).
 
 The first table has what a pass takes: rendering 16 samples of each pixel, copying them from the card, pushing and judging
 them, in a loop that does one after the other. The second has wall times. Each renderer and size is rendered until all tiles
@@ -21,13 +20,12 @@ import time
 import numpy as np
 
 import noisefloor
+from figures import table
 
 # Samples of each pixel in one call, and in a pass of the first table.
 AT_ONCE, PASS = 4, 16
 # Seconds after which the first table has seen enough passes.
 ENOUGH = 8
-# Seconds for a sample of a pixel without a card, a millisecond for all of 1920×1080, and its noise.
-PACE, NOISE = 1e-3 / (1920 * 1080), 3
 
 # A room of two walls, a floor and a ball under a lamp and a sky: as little work for each sample as a path tracer can
 # have, so that the oracle has the least time.
@@ -80,22 +78,7 @@ extern "C" __global__ void trace(float *mean, int width, int height, int spp, un
 
 
 def renderer(kind, width, height):
-    """A function of (spp, seed) that returns an array on the device when it is done; `fetch` of it brings one to memory, and
-    is told its samples."""
-    if kind == "paced":
-        pixels = width * height
-        light = (0.5 + np.abs(np.sin(np.arange(width) / 97)))[None, :, None].astype(np.float32)
-        noise = np.random.default_rng(63).standard_normal(3 * pixels + 2**20, np.float32)
-        image, starts = np.empty((height, width, 3), np.float32), itertools.count(100_003, 100_003)
-        def render(spp, seed):
-            time.sleep(PACE * spp * pixels)
-            return np.zeros((), np.float32)
-        def fetch(_, spp):
-            first = next(starts) % 2**20
-            np.multiply(noise[first:first + 3 * pixels].reshape(image.shape), NOISE / spp**0.5, out=image)
-            return np.add(image, light, out=image)
-        render.fetch = fetch
-        return render
+    """A function of (spp, seed) that returns an array on the device when it is done; `fetch` of it brings one to memory."""
     if kind == "cuda":
         import cupy
         import cupyx
@@ -108,7 +91,7 @@ def renderer(kind, width, height):
             return mean
         # Memory that is pinned, and the same every time: a card writes into fresh memory at a tenth of the speed
         pinned = cupyx.empty_pinned((height, width, 3), np.float32)
-        render.fetch = lambda image, spp: image.get(out=pinned)
+        render.fetch = lambda image: image.get(out=pinned)
         return render
     import drjit
     import mitsuba
@@ -127,19 +110,14 @@ def renderer(kind, width, height):
     def evaluate(image):
         drjit.eval(image)
         drjit.sync_thread()
-    render.evaluate, render.fetch = evaluate, lambda image, spp: np.asarray(image)
+    render.evaluate, render.fetch = evaluate, np.asarray
     return render
 
 
-def named(kind):
-    """As the ledger calls a renderer."""
-    known = {"cuda": "CUDA, 60 lines", "cornell": "Mitsuba, Cornell box", "paced": "paced"}
-    return known.get(kind) or "Mitsuba, " + os.path.basename(os.path.dirname(kind))
-
-
-def session(width, height, tile, limit):
-    params = noisefloor.Params(tile=tile, max_spp=limit, schedule="growing", step=16)
-    return noisefloor.Session(width, height, params=params)
+def named(kind, width, height):
+    """As the ledger calls a renderer and a size."""
+    known = {"cuda": "CUDA, 60 lines", "cornell": "Mitsuba, Cornell box"}
+    return f"{known.get(kind) or 'Mitsuba, ' + os.path.basename(os.path.dirname(kind))}, {width}×{height}"
 
 
 class Sums:
@@ -160,11 +138,11 @@ class Sums:
     def take(self):
         spp, mean = self.spp, self.sum / self.spp
         self.spp, self.sum = 0, None
-        return spp, self.render.fetch(mean, spp)
+        return spp, self.render.fetch(mean)
 
 
 def parts(render, judged, limit):
-    """Milliseconds a pass for rendering, copying, pushing and judging, the longest verdict, and the passes."""
+    """Milliseconds a pass for rendering, copying, pushing and judging, and the longest verdict."""
     seconds, longest, passes, begin = np.zeros(4), 0.0, 0, time.perf_counter()
     while not judged.done and passes * PASS < limit and time.perf_counter() - begin < ENOUGH:
         passes += 1
@@ -173,7 +151,7 @@ def parts(render, judged, limit):
         if hasattr(render, "evaluate"):
             render.evaluate(image)
         marks.append(time.perf_counter())
-        image = np.ascontiguousarray(render.fetch(image, PASS), np.float32)
+        image = np.ascontiguousarray(render.fetch(image), np.float32)
         marks.append(time.perf_counter())
         judged.push_image(PASS, image)
         marks.append(time.perf_counter())
@@ -181,7 +159,7 @@ def parts(render, judged, limit):
         marks.append(time.perf_counter())
         took = np.diff(marks)
         seconds, longest = seconds + took, max(longest, took[3])
-    return 1e3 * seconds / passes, 1e3 * longest, passes
+    return 1e3 * seconds / passes, 1e3 * longest
 
 
 def alone(render, calls):
@@ -232,28 +210,29 @@ def main():
         card = "no NVIDIA card"
     print(f"{card}; {os.cpu_count()} processors; noisefloor {noisefloor.__version__}")
     kinds, sizes = options.renderers.split(","), [tuple(map(int, size.split("x"))) for size in options.sizes.split(",")]
-    renderers = {}
-    print("### gpu-pass\n| | render | copy | push | judge | oracle : render |\n|---|---|---|---|---|---|")
-    for kind, (width, height) in itertools.product(kinds, sizes):
-        render = renderers[kind, width, height] = renderer(kind, width, height)
-        render(PASS, 10**6)  # compiles
-        judged = noisefloor.Session(width, height, params=noisefloor.Params(tile=options.tile, max_spp=options.limit))
-        (rendered, *oracle), longest, _ = parts(render, judged, options.limit)
-        cells = " | ".join(f"{number:.1f}" for number in [rendered, *oracle])
-        print(f"| {named(kind)}, {width}×{height} | {cells} ({longest:.0f}) | ×{sum(oracle) / rendered:.2f} |", flush=True)
-    print("\n### gpu-wall\n| | alone | a session that waits | in the background | samples beyond the stop |\n|---|---|---|---|---|")
-    for (kind, width, height), render in renderers.items():
-        warm = Sums(render)
-        for _ in range(2):
-            warm.add()
-        warm.take()
-        new = lambda: session(width, height, options.tile, options.limit)
-        waited, calls = waiting(render, new())
-        beside, more = background(render, new())
-        # Each beside as many samples without an oracle
-        plain, as_many = alone(render, calls), alone(render, more)
-        print(f"| {named(kind)}, {width}×{height} | {plain:.2f} s | ×{waited / plain:.2f} | ×{beside / as_many:.2f} "
-              f"| {100 * (more / calls - 1):.1f} % |", flush=True)
+    renderers = {each: renderer(each[0], *each[1]) for each in itertools.product(kinds, sizes)}
+
+    def passes():
+        for (kind, size), render in renderers.items():
+            render(PASS, 10**6)  # compiles
+            judged = noisefloor.Session(*size, params=noisefloor.Params(tile=options.tile, max_spp=options.limit))
+            (rendered, *oracle), longest = parts(render, judged, options.limit)
+            *cells, judging = (f"{number:.1f}" for number in [rendered, *oracle])
+            yield named(kind, *size), *cells, f"{judging} ({longest:.0f})", f"×{sum(oracle) / rendered:.2f}"
+
+    def walls():
+        for (kind, size), render in renderers.items():
+            params = noisefloor.Params(tile=options.tile, max_spp=options.limit, schedule="growing", step=16)
+            alone(render, 2)  # warms up
+            waited, calls = waiting(render, noisefloor.Session(*size, params=params))
+            beside, more = background(render, noisefloor.Session(*size, params=params))
+            # Each beside as many samples without an oracle
+            plain, as_many = alone(render, calls), alone(render, more)
+            yield (named(kind, *size), f"{plain:.2f} s", f"×{waited / plain:.2f}", f"×{beside / as_many:.2f}",
+                   f"{100 * (more / calls - 1):.1f} %")
+
+    table("gpu-pass", ["render", "copy", "push", "judge", "oracle : render"], passes())
+    table("gpu-wall", ["alone", "a session that waits", "in the background", "samples beyond the stop"], walls())
 
 
 if __name__ == "__main__":

@@ -18,13 +18,14 @@ import sys
 
 import numpy as np
 
+from figures import factor, table
+
 LIMIT, LEAST, DECAY = 0.3, 1e-3, 0.38
 # Tiles whose reference has itself lost as much are left out
 NOISY_REFERENCE = 0.1
 # The rule: power, step, medians that the hardest counts as at most, margin from 16 tiles on, the least that an estimate counts as, how
-# near a need has to be that is not looked at a third time, and the powers of an estimate, of earlier ones, and of those around it; and
-# the margin of each tile to the limit
-TOGETHER, STEP, MEDIANS, MARGIN, FLOOR, FORESEEN, BEFORE = 0.85, 1.2, 8, 1.2, 1 / 4, 2, 1.5
+# near a need has to be that is not looked at a third time, and the powers of an estimate, of earlier ones, and of those around it
+TOGETHER, STEP, MEDIANS, MARGIN, FLOOR, FORESEEN = 0.85, 1.2, 8, 1.2, 1 / 4, 2
 OWN, EARLIER, AROUND = 0.4, 0.3, 0.3
 # The schedule: samples that counts are multiples of, and how much they grow at the least and at the most
 GRID, GROWS = 16, (1.5, 4)
@@ -263,13 +264,6 @@ def ours(picture, **how):
     return Outcome(picture, levels, done, done & undenoised)
 
 
-def each(picture):
-    """Each tile to the limit, with the margin that one estimate needs."""
-    levels = first_below(picture.says(), LIMIT / BEFORE, 48, picture.spp)
-    here = np.minimum(levels, len(picture.spp) - 1), np.arange(len(levels))
-    return Outcome(picture, levels, undenoised=GAIN * picture.estimate[here] > LIMIT / BEFORE)
-
-
 def together(picture):
     """One count for all, where all tiles are satisfied."""
     passed = (picture.says() <= LIMIT / MARGIN).all(1) & (picture.spp >= 16)
@@ -299,13 +293,11 @@ def hindsight(scenes, rule):
 def rules(scenes):
     """Every rule in every picture, by its name."""
     alone = lambda picture: ours(picture, powers=(1, 0, 0))
-    every = {"ours": ours, "ours, each estimate by itself": alone, "each to the limit, ×1.5, from 48": each, "one count, when all are satisfied": together}
+    every = {"ours": ours, "ours, each estimate by itself": alone, "one count, when all are satisfied": together}
     found = {label: {scene: [rule(p) for p in pictures] for scene, pictures in scenes.items()} for label, rule in every.items()}
     for rule in RULES:
         best = hindsight(scenes, rule)
-        found[f"{rule}, people's"] = {s: [rival(p, rule, PEOPLE[rule]) for p in pictures] for s, pictures in scenes.items()}
         found[f"{rule}, in hindsight"] = {s: [rival(p, rule, best[s]) for p in pictures] for s, pictures in scenes.items()}
-        print(f"{rule}: constants in hindsight {min(best.values()):.4g} to {max(best.values()):.4g}")
     found["the truth known"] = {s: [Outcome(p, first_below(p.true, LIMIT, 16, p.spp)) for p in pictures] for s, pictures in scenes.items()}
     return found
 
@@ -340,41 +332,33 @@ def compared(pictures, outcomes, reference):
 
 
 def tables(args):
+    """Against references of noisy pictures, which the pages have, and of denoised ones."""
     scenes = read(args.rows)
     played = rules(scenes)
-    good = {s: sum(p.good.sum() for p in pictures) for s, pictures in scenes.items()}
-    print(f"{len(scenes)} scenes; tiles with a reference: " + ", ".join(f"{s} {good[s]} of {2 * len(TILES)}" for s in scenes))
-    for s, pictures in scenes.items():
-        most = [(p.count[-1].max(), p.spp[-1]) for p in pictures]
-        print(s, "levels to", most, "and of 20 tiles 19 references have lost", [f"{np.quantile(p.reference, 0.95):.3f}" for p in pictures])
-    for reference in ("noisy", "denoised"):
-        print(f"\n### larger{'' if reference == 'noisy' else '-denoised'}\n| | samples, two seeds | seconds | worst, 19 of 20, median, mean | beyond 0.3 | "
-              + " | ".join(f"uniform, by {by}" for by in MEASURES) + " | in seconds, worst |\n" + "|---" * 10 + "|")
+    uniform = [f"uniform, by {by}" for by in MEASURES]
+    for reference, name in (("noisy", "larger"), ("denoised", "larger-denoised")):
+        rows = []
         for scene, pictures in scenes.items():
             outcomes = played["ours"][scene]
-            samples, seconds, lost, same = compared(pictures, outcomes, reference)
-            each = " / ".join(f"{o.samples():.0f}" for o in outcomes)
+            _, _, _, same = compared(pictures, outcomes, reference)
             beyond = sum((o.lost(reference)[o.let_go()] > LIMIT).sum() for o in outcomes)
-            let_go = sum(o.let_go().sum() for o in outcomes)
-            losses = " / ".join(", ".join(f"{m(o.lost(reference)):.2f}" for m in MEASURES.values()) for o in outcomes)
-            print(f"| {scene} | {each} | {seconds:.0f} | {losses} | {beyond} of {let_go} | "
-                  + " | ".join(f"{sign}{' ' if sign else ''}{n:.0f}, ×{ratio:.2f}" for n, sign, ratio, _ in same.values())
-                  + f" | ×{same['worst'][3]:.2f} |")
-        print(f"\n### larger-rules{'' if reference == 'noisy' else '-denoised'}\n| | samples | seconds | worst, 19 of 20, median, mean | beyond 0.3 | at most | "
-              + " | ".join(f"uniform, by {by}" for by in MEASURES) + " | in seconds, worst |\n" + "|---" * 11 + "|")
+            losses = (", ".join(f"{m(o.lost(reference)):.2f}" for m in MEASURES.values()) for o in outcomes)
+            rows.append([scene, " / ".join(f"{o.samples():.0f}" for o in outcomes), " / ".join(losses),
+                         f"{beyond} of {sum(o.let_go().sum() for o in outcomes)}",
+                         *(f"{sign}{' ' if sign else ''}{n:.0f}, {factor(ratio)}" for n, sign, ratio, _ in same.values()),
+                         factor(same["worst"][3])])
+        table(name, ["samples, two seeds", "worst, 19 of 20, median, mean", "beyond 0.3", *uniform, "in seconds, worst"], rows)
+        rows = []
         for label, by_scene in played.items():
             found = [compared(scenes[s], outcomes, reference) for s, outcomes in by_scene.items()]
-            gm = lambda values: np.exp(np.log(np.maximum(values, LEAST)).mean())
             lost = np.concatenate([o.lost(reference)[o.let_go()] for outcomes in by_scene.values() for o in outcomes])
-            cells = [f"{gm([f[0] for f in found]):.0f}", f"{gm([f[1] for f in found]):.1f}",
-                     ", ".join(f"{gm([f[2][by] for f in found]):.2f}" for by in MEASURES),
-                     f"{(lost > LIMIT).sum()} of {len(lost)}", f"×{lost.max(initial=0) / LIMIT:.2f}"]
+            cells = [f"{np.exp(np.log([f[0] for f in found]).mean()):.0f}", f"{(lost > LIMIT).sum()} of {len(lost)}",
+                     factor(lost.max(initial=0) / LIMIT)]
             for by in MEASURES:
                 ratios = [f[3][by][2] for f in found]
-                cells.append(f"×{np.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}; {sum(r < 1 for r in ratios)})")
-            cells.append(f"×{np.median([f[3]['worst'][3] for f in found]):.2f}")
-            print(f"| {label} | " + " | ".join(cells) + " |")
-        print(f"\nbehind ours, by as good as uniform, {reference}:")
+                cells.append(f"{factor(np.median(ratios))} ({min(ratios):.2f} to {max(ratios):.2f}; {sum(r < 1 for r in ratios)})")
+            rows.append([label, *cells])
+        table(name.replace("larger", "larger-rules"), ["samples", "beyond 0.3", "at most", *uniform], rows)
         mine = {s: compared(scenes[s], played["ours"][s], reference)[3] for s in scenes}
         for label, by_scene in played.items():
             theirs = {s: compared(scenes[s], by_scene[s], reference)[3] for s in scenes}
