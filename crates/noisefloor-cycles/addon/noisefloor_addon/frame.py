@@ -5,7 +5,6 @@ The threshold says where samples go, pixel by pixel; noisefloor says when they a
 picture more are needed. Every sample counts in the end."""
 
 import concurrent.futures
-import hashlib
 import math
 import time
 
@@ -29,6 +28,10 @@ AIM, LEAST_STEP = 0.9, 1.25
 FEWEST = 16
 # What a call costs a GPU, however small the part, in samples of each pixel of the frame: 36 and 40 on an H200 (docs/benchmarks/cost.md)
 START = 32
+
+
+def warn(engine, text):
+    engine.report({"WARNING"}, f"noisefloor: {text}")
 
 
 def film_rate(scene):
@@ -72,9 +75,7 @@ class Frame:
             top = self.down - int(render.border_min_y * self.down) - self.size[1]
         self.corner = left, top
         seed = self.scene.cycles.seed
-        self.seed = (
-            f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
-        )
+        self.seed = f"{seed} frame {self.scene.frame_current}" if self.scene.cycles.use_animated_seed else seed
         self.film = self._film()
         self.fewest = self.scene.cycles.adaptive_min_samples
         self.denoises = self.scene.cycles.use_denoising and depsgraph.view_layer_eval.cycles.use_denoising
@@ -101,11 +102,8 @@ class Frame:
         if not self.engine.is_animation:
             return None
         if not self.scene.cycles.use_animated_seed:
-            self.engine.report(
-                {"WARNING"},
-                "All frames have the same seed: their noise stands still on the screen, and takes about three times "
-                "the samples to vanish. Use Animated Seed (the clock beside Seed), so that noisefloor judges them as a film",
-            )
+            warn(self.engine, "all frames have the same seed: their noise stands still on the screen, and takes about three times the "
+                 "samples to vanish. Use Animated Seed (the clock beside Seed), so that they are judged as a film")
             return None
         return film_rate(self.scene)
 
@@ -114,9 +112,7 @@ class Frame:
         layer, wanted = depsgraph.view_layer_eval.cycles, [(COUNT, 1, "X")]
         layer.pass_debug_sample_count = True
         if self.denoises and self.judge.library is None:
-            self.engine.report(
-                {"WARNING"}, "noisefloor does not denoise: this Blender has no Open Image Denoise"
-            )
+            warn(self.engine, "nothing is denoised, since this Blender has no Open Image Denoise")
         if self.judge.library and self.judge.guides:
             layer.denoising_store_passes = True
             wanted += [(judging.NORMAL, 3, "XYZ"), (judging.ALBEDO, 3, "RGB")]
@@ -128,17 +124,9 @@ class Frame:
     def run(self, report):
         """Renders until every square is done; calls report(frame) after each picture."""
         render, cycles = self.engine.render, self.scene.cycles
-        border = [
-            "use_border",
-            "use_crop_to_border",
-            "border_min_x",
-            "border_max_x",
-            "border_min_y",
-            "border_max_y",
-        ]
         # The evaluated scene is the same in the next frame of an animation, and in the next layer
         every = [prop.identifier for prop in cycles.bl_rna.properties if not prop.is_readonly]
-        owned = [(render, name) for name in border] + [(cycles, name) for name in every]
+        owned = [(render, name) for name in sampling.BORDER] + [(cycles, name) for name in every]
         before = [(owner, name, getattr(owner, name)) for owner, name in owned]
         try:
             while self.reason is None:
@@ -202,10 +190,7 @@ class Frame:
             missing = wanted - self.effort[cell]
             if samples >= FEWEST and missing > 0:
                 threshold = float(f"{missing**-0.5:.3g}")
-                jobs.append(
-                    {"x": x, "y": y, "width": width, "height": height}
-                    | {"threshold": threshold, "samples": samples}
-                )
+                jobs.append(dict(x=x, y=y, width=width, height=height, threshold=threshold, samples=samples))
         return jobs
 
     def _room(self, region):
@@ -281,16 +266,11 @@ class Frame:
         x, y, width, height = region
         # For motion blur, Cycles evaluates other frames, and settings that move are as in the file again
         cycles = self.depsgraph.scene_eval.cycles
-        digest = hashlib.blake2b(
-            f"{self.seed} half {half} round {len(self.thresholds)}{self.stream}".encode(), digest_size=4
-        ).digest()
-        sampling.adapt(cycles, int.from_bytes(digest, "little") >> 1, threshold, samples)
+        seed = sampling.seed_of(f"{self.seed} half {half} round {len(self.thresholds)}{self.stream}")
+        sampling.adapt(cycles, seed, threshold, samples)
         cycles.time_limit = seconds
-        sampling.aim(
-            self.engine.render,
-            (self.across, self.down),
-            (x + self.corner[0], y + self.corner[1], width, height),
-        )
+        part = x + self.corner[0], y + self.corner[1], width, height
+        sampling.aim(self.engine.render, (self.across, self.down), part)
         self.cycles()
         pictures = passes.read(self.engine, self.layer, (width, height))
         return pictures, sampling.counts(pictures.pop(COUNT), self.fewest, threshold, samples)
@@ -318,7 +298,7 @@ class Frame:
                     self.engine.add_pass(noisy, len(letters), letters, layer=self.layer)
         with concurrent.futures.ThreadPoolExecutor(1) as beside:
             # One thread says what is lost where, while the others denoise, or a GPU does
-            left = beside.submit(self._left)
+            left = beside.submit(self.excess.map if self.excess else lambda: numpy.full(self.size[::-1], numpy.nan, numpy.float32))
             if pictures and self.judge.library:
                 pictures["Combined"] = self.judge.denoise(pictures)
                 if "Shadow Catcher" in pictures:
@@ -330,12 +310,6 @@ class Frame:
             self.engine.add_pass(name, 1, "X", layer=self.layer)
         passes.write(self.engine, self.layer, {**pictures, **maps})
         return spp, left
-
-    def _left(self):
-        """What is left of what may be seen, or has been lost, pixel by pixel."""
-        if self.excess is None:
-            return numpy.full(self.size[::-1], numpy.nan, numpy.float32)
-        return self.excess.map()
 
     def progress(self):
         """Share of the samples that are taken, and seconds left; None while unknown."""

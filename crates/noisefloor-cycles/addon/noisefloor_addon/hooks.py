@@ -15,12 +15,13 @@ import traceback
 
 import bpy
 import gpu
+import noisefloor
 import numpy
 from bpy.app.handlers import persistent
 from gpu_extras.presets import draw_texture_2d
 
 from . import compositor, display, maps, passes
-from .frame import Frame
+from .frame import Frame, warn
 
 original = {}
 # By which Blender, too, knows that a file has been named in full, beside its own
@@ -119,10 +120,8 @@ def render(engine, depsgraph):
             state.rendered[layer] = {name: picture.copy() for name, picture in pictures.items()}
         return None
     if not engine.render.use_persistent_data or engine.render.use_multiview:
-        why = "stereoscopy" if engine.render.use_multiview else "scenes rendered for another scene"
-        engine.report(
-            {"WARNING"}, f"noisefloor does not know {why}: Cycles renders by its own sampling settings"
-        )
+        what = "stereo pictures" if engine.render.use_multiview else "scenes rendered for another scene"
+        warn(engine, f"Cycles renders {what} by its own sampling settings")
         return original["render"](engine, depsgraph)
     try:
         _render(engine, depsgraph)
@@ -144,9 +143,9 @@ def _render(engine, depsgraph):
     depsgraph.scene_eval.camera.update_tag(refresh={"OBJECT"})
     frame = state.frame = Frame(engine, depsgraph, cycles, state.shown)
     if frame.judge.note:
-        engine.report({"WARNING"}, f"noisefloor: {frame.judge.note}")
+        warn(engine, frame.judge.note)
     if compositor.denoises(depsgraph.scene) and not frame.denoises:
-        engine.report({"WARNING"}, f"noisefloor: {compositor.ADVICE}")
+        warn(engine, compositor.ADVICE)
 
     def report(frame):
         text, share = _progress(frame)
@@ -174,9 +173,12 @@ def _render(engine, depsgraph):
             state.images[f"noisefloor {name}" + (f", {frame.layer}" if many else "")] = picture
     if frame.settings.write_maps:
         stem = output(frame.scene, engine.is_animation) + (f"-{frame.layer}" if many else "")
+        os.makedirs(os.path.dirname(stem) or ".", exist_ok=True)
         for name, picture in pictures.items():
-            _write(f"{stem}-{name.replace(' ', '-')}.png", maps.png(picture, summary))
-        _write(f"{stem}-noisefloor.txt", (summary + "\n").encode())
+            # Blender's own images are out of bounds in this thread
+            noisefloor.write(f"{stem}-{name.replace(' ', '-')}.png", picture, encoding="srgb")
+        with open(f"{stem}-noisefloor.txt", "w", encoding="utf-8") as file:
+            file.write(summary + "\n")
     if error:
         try:
             raise error
@@ -204,14 +206,6 @@ def output(scene, animated):
     path = bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current))
     stem = os.path.splitext(path)[0]
     return f"{stem}-{scene.frame_current:04}" if scene.render.is_movie_format else stem
-
-
-def _write(path, data):
-    """Files are complete or absent."""
-    os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-    with open(path + ".part", "wb") as file:
-        file.write(data)
-    os.replace(path + ".part", path)
 
 
 def _headless(yes):

@@ -1,9 +1,6 @@
-"""Heat maps, and PNG files without Blender: files are written while it renders, in a thread where its images
-are out of bounds."""
+"""Heat maps."""
 
 import math
-import struct
-import zlib
 
 import numpy
 
@@ -11,8 +8,6 @@ import numpy
 RAMP = numpy.array(
     [(13, 8, 60), (84, 20, 110), (160, 45, 95), (220, 95, 55), (248, 165, 45), (250, 240, 150)], float
 )
-
-
 # The same in steps that nobody tells apart, as many as a byte has numbers; and grey, where there is nothing
 COLOURS = numpy.stack(
     [numpy.interp(numpy.arange(256) / 51, numpy.arange(len(RAMP)), RAMP[:, channel]).round() for channel in range(3)], -1
@@ -41,23 +36,3 @@ def left_map(left, denoised, settings):
     if denoised:
         return {"jod lost": heat(left / settings.lost, 0.25, 4.0)}
     return {"visible noise": heat(left, 0.25, 4.0)}
-
-
-def png(colours, text):
-    """A PNG file with a comment."""
-    height, width = colours.shape[:2]
-    rows = numpy.concatenate([numpy.zeros((height, 1), numpy.uint8), colours.reshape(height, -1)], 1)
-
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    comment = b"Comment\0\0\0\0\0" + text.encode()
-    return b"".join(
-        [
-            b"\x89PNG\r\n\x1a\n",
-            chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
-            chunk(b"iTXt", comment),
-            chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)),
-            chunk(b"IEND", b""),
-        ]
-    )

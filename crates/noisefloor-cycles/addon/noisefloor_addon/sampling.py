@@ -12,8 +12,8 @@ import math
 
 # Points of Cycles' table; a pattern of its own follows. Older versions of Blender render no part of a longer one
 LONGEST, WITHOUT_PARTS = 8192, 16
-# Samples of a call: each costs Cycles a start
-BATCH = 16
+# What says which region is rendered
+BORDER = ["use_border", "use_crop_to_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y"]
 
 
 def independent(cycles):
@@ -33,6 +33,11 @@ def independent(cycles):
     cycles.use_auto_tile = False
 
 
+def seed_of(text):
+    """A seed that follows from a text: Cycles' have 31 bits."""
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "little") >> 1
+
+
 def longest(cycles):
     """Samples of a half until the next pattern begins."""
     return LONGEST if hasattr(cycles, "use_sample_subset") else WITHOUT_PARTS
@@ -42,8 +47,7 @@ def choose(cycles, seed, sequence, point, length, stream=""):
     """Chooses samples of a sequence, from a point on; no more than are left of the pattern. Streams share no
     patterns."""
     pattern, offset = divmod(point, longest(cycles))
-    digest = hashlib.blake2b(f"{seed}{stream} {sequence} {pattern}".encode(), digest_size=4).digest()
-    cycles.seed = int.from_bytes(digest, "little") >> 1
+    cycles.seed = seed_of(f"{seed}{stream} {sequence} {pattern}")
     if hasattr(cycles, "use_sample_subset"):
         cycles.samples, cycles.use_sample_subset = LONGEST, True
         cycles.sample_offset, cycles.sample_subset_length = offset, length
@@ -109,7 +113,4 @@ def aim(render, frame, region):
     render.use_border = render.use_crop_to_border = True
     # Blender cuts edges down to whole pixels: a quarter keeps them clear of rounding
     render.border_min_x, render.border_max_x = (x + 0.25) / across, min(1.0, (x + width + 0.25) / across)
-    render.border_min_y, render.border_max_y = (
-        (bottom + 0.25) / down,
-        min(1.0, (bottom + height + 0.25) / down),
-    )
+    render.border_min_y, render.border_max_y = (bottom + 0.25) / down, min(1.0, (bottom + height + 0.25) / down)

@@ -21,7 +21,6 @@ ENDINGS = {
 }
 # As many as noisefloor.Search asks for at the most, and its longest step, in thresholds
 CROPS, LEAP = 4, 0.25
-BORDER = ["use_border", "use_crop_to_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y"]
 
 
 class Search:
@@ -44,17 +43,12 @@ class Search:
         catches = any(each.is_shadow_catcher for each in bpy.data.objects)
         self.judge = judging.Judge(scene, display.table(scene), self.film, self.denoised, catches)
         shot = scene.render
-        self.size = tuple(
-            side * shot.resolution_percentage // 100 for side in (shot.resolution_x, shot.resolution_y)
-        )
+        self.size = tuple(side * shot.resolution_percentage // 100 for side in (shot.resolution_x, shot.resolution_y))
         # A region of the user's own is a picture of its own, and small
         # To a GPU, a part costs about what the whole does
         whole = shot.use_border or denoise.gpu(scene)
-        self.search = noisefloor.Search(
-            threshold=(frame.COARSEST, frame.FINEST),
-            views=len(self.frames),
-            size=None if whole else self.size,
-        )
+        thresholds, size = (frame.COARSEST, frame.FINEST), None if whole else self.size
+        self.search = noisefloor.Search(threshold=thresholds, views=len(self.frames), size=size)
         # What is rendered next; and how hard the hardest frames are, with the whole pictures that crops may be cut from
         self.look, self.whole, self.pictures, self.begun = None, {}, [], 0.0
         self.running, self.done = self._run(), False
@@ -117,7 +111,7 @@ class Search:
         wanted += [(layer.cycles, "pass_debug_sample_count", True) for layer in layers]
         if self.denoised:
             wanted += [(layer.cycles, "denoising_store_passes", bool(self.judge.guides)) for layer in layers]
-        owned = [(group, name) for group, name, _ in wanted] + [(shot, name) for name in BORDER]
+        owned = [(group, name) for group, name, _ in wanted] + [(shot, name) for name in sampling.BORDER]
         self.borrowed = [(group, name, getattr(group, name)) for group, name in owned]
         for group, name, value in wanted:
             setattr(group, name, value)
@@ -286,7 +280,7 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
     def execute(self, context):
         """All at once: without windows, and from scripts."""
         try:
-            search = Search(context.scene)
+            self.search = search = Search(context.scene)
             try:
                 search.advance()
                 while not search.done:
@@ -295,15 +289,18 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
                     print(search.status(), flush=True)
             finally:
                 search.end()
-            self.report({"INFO"}, self.tell(search.finish()))
+            self.tell()
         except (ValueError, noisefloor.Error) as error:
-            self.report({"ERROR"}, f"noisefloor: {error}")
-            return {"CANCELLED"}
+            return self.fail(error)
         return {"FINISHED"}
 
-    def tell(self, text):
-        hooks.state.summary = text
-        return text
+    def fail(self, error):
+        self.report({"ERROR"}, f"noisefloor: {error}")
+        return {"CANCELLED"}
+
+    def tell(self):
+        hooks.state.summary = self.search.finish()
+        self.report({"INFO"}, hooks.state.summary)
 
     def invoke(self, context, event):
         if bpy.app.background:
@@ -311,8 +308,7 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
         try:
             self.search = hooks.state.search = Search(context.scene)
         except (ValueError, noisefloor.Error) as error:
-            self.report({"ERROR"}, f"noisefloor: {error}")
-            return {"CANCELLED"}
+            return self.fail(error)
         self.timer = context.window_manager.event_timer_add(0.25, window=context.window)
         context.window_manager.modal_handler_add(self)
         self.search.advance()
@@ -337,11 +333,10 @@ class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
             if not self.search.done:
                 self.start(context)
                 return {"RUNNING_MODAL"}
-            self.report({"INFO"}, self.tell(self.search.finish()))
+            self.tell()
             return self.end(context, {"FINISHED"})
         except (ValueError, noisefloor.Error) as error:
-            self.report({"ERROR"}, f"noisefloor: {error}")
-            return self.end(context, {"CANCELLED"})
+            return self.end(context, self.fail(error))
 
     def end(self, context, how):
         hooks.state.search = None
@@ -369,8 +364,8 @@ class RENDER_OT_noisefloor_stop(bpy.types.Operator):
 def estimate(scene):
     """What a search will take, in words."""
     last = hooks.state.took.get(scene.name)
-    about = f", about {clock(2 * last)} to {clock(3 * last)}" if last else ""
-    return f"Takes two to three frames{about}"
+    about = f", about {clock(last)} to {clock(5 * last)}" if last else ""
+    return f"Takes one to five frames{about}"
 
 
 def draw_bar(row, share, text):
