@@ -66,10 +66,9 @@ class Cycles:
         # What the file says is the default: a GPU that is not there renders on the processor, as in Blender
         wanted = init.get("device") or ("auto" if self.scene.cycles.device == "GPU" else "cpu")
         warnings = self._configure(init)
-        gpu, note = host.pick(wanted, *(self.gpus() if wanted != "cpu" else ([], "")), self._use)
+        gpu = host.pick(wanted, self.gpus, warnings, self._use)
         if gpu is None:
             self.scene.cycles.device = "CPU"
-        warnings += [note] if note else []
         self.info = {
             "name": f"Cycles {bpy.app.version_string}{f' ({gpu[0]}, {gpu[1]})' if gpu else ''}",
             "width": self.scene.render.resolution_x,
@@ -149,8 +148,7 @@ class Cycles:
             for member in members:
                 t = tiles[member]
                 x, y = t["x"] - region[0], t["y"] - region[1]
-                part = mean[y : y + t["height"], x : x + t["width"]]
-                answers[member] = (samples, self.np.ascontiguousarray(part, self.np.float32))
+                answers[member] = samples, mean[y : y + t["height"], x : x + t["width"]]
         return answers
 
     def adaptive(self, threshold, samples, seed, part):
@@ -188,8 +186,7 @@ class Cycles:
                 tree.links.new(together.outputs[0], out.inputs[0])
                 picture, shares = self._render(alpha=True)
             taken = counts(shares.astype(self.np.float32), *limits)
-            taken = self.np.repeat(taken, 3, axis=2)
-            return self.np.ascontiguousarray(picture, self.np.float32), taken, (*fewest, cycles.samples)
+            return picture, self.np.repeat(taken, 3, axis=2), (*fewest, cycles.samples)
         finally:
             layer.cycles.pass_debug_sample_count = counted
             for name, value in before.items():
@@ -229,7 +226,7 @@ class Cycles:
             cycles.diffuse_bounces, layer.cycles.denoising_store_passes = before
         albedo, normal = pictures
         # A lamp's albedo is its radiance
-        return [self.np.ascontiguousarray(part, self.np.float32) for part in (self.np.clip(albedo, 0, 1), normal)]
+        return self.np.clip(albedo, 0, 1), normal
 
     def _mean(self, region, sequence, point, samples, stream=""):
         """Mean of samples of a sequence from a point on, of a region, pattern by pattern."""

@@ -27,10 +27,10 @@ class Oidn:
         self.oidn, self.np = mitsuba_oidn, numpy
         self.filters = {}
         self.pool = ThreadPoolExecutor(2)
-        self.gpu, note = host.pick(init.get("device") or "cpu", *self.gpus(), self.device)
+        warnings = []
+        self.gpu = host.pick(init.get("device"), self.gpus, warnings, self.device)
         name = f"Open Image Denoise {mitsuba_oidn.Device(mitsuba_oidn.DeviceType.CPU).version}"
-        self.info = {"name": f"{name} ({self.gpu[1]}, {self.gpu[0]})" if self.gpu else name}
-        self.info["warnings"] = [note] if note else []
+        self.info = {"name": f"{name} ({self.gpu[1]}, {self.gpu[0]})" if self.gpu else name, "warnings": warnings}
 
     @staticmethod
     def gpus():

@@ -89,9 +89,9 @@ class LuxCore:
         self.seed, self.drawn = init["seed"], 0
         self.metropolis, self.sobol = sampler == "metropolis", sampler == "sobol"
 
-        gpu, note = self._device(init.get("device") or "cpu", engine)
         warnings = self._configure(init["scene"], init, engine, sampler)
-        warnings += [note] if note else []
+        there = self.gpus if engine == "path" else lambda: ([], "LuxCore's tracer from both ends has no engine for GPUs")
+        gpu = host.pick(init.get("device"), there, warnings)
         if gpu:
             on = {"renderengine.type": ON_GPU, "opencl.native.threads.count": 0, "opencl.devices.select": gpu[2]}
             for key, value in on.items():
@@ -125,13 +125,6 @@ class LuxCore:
                 found.append((kind.removesuffix("_GPU"), name, place))
         # CUDA before OpenCL, which is the same card, slower
         return sorted(found, key=lambda gpu: gpu[0] != "CUDA"), "LuxCore finds no device of CUDA or OpenCL"
-
-    def _device(self, wanted, engine):
-        if wanted == "cpu":
-            return None, None
-        if engine != "path":
-            return host.pick(wanted, [], "LuxCore's tracer from both ends has no engine for GPUs")
-        return host.pick(wanted, *self.gpus())
 
     def sample(self, tiles):
         if self.metropolis:
@@ -171,7 +164,7 @@ class LuxCore:
             # The halt condition is looked at here
             session.UpdateStats()
         film = session.GetFilm()
-        picture = self.np.ascontiguousarray(self._picture(film))
+        picture = self._picture(film)
         session.Stop()
         return picture
 
@@ -307,7 +300,7 @@ class LuxCore:
                 drawn = self.surplus.get(key, 0.0) + float(counts[inside].mean())
                 given = said(samples, drawn)
                 self.surplus[key] = drawn - given
-                answers[member] = (given, self.np.ascontiguousarray(picture[inside]))
+                answers[member] = given, picture[inside]
         return answers
 
     def _in_blocks(self, tiles):
@@ -321,7 +314,7 @@ class LuxCore:
                 sums[i] = sums[i] + mean.astype(self.np.float64) * samples
                 given[i] += samples
                 left[i] -= part["samples"]
-        return [(n, (total / n).astype(self.np.float32)) for n, total in zip(given, sums)]
+        return [(n, total / n) for n, total in zip(given, sums)]
 
     # Metropolis sampler
 
@@ -380,7 +373,7 @@ class LuxCore:
         over a batch would be further off than that over the whole chain."""
         new = said(asked, self._total(chain.film) / chain.pixels - chain.given)
         total = self._picture(chain.film).astype(self.np.float64) * (chain.given + new)
-        mean = ((total - chain.total) / new).astype(self.np.float32)
+        mean = (total - chain.total) / new
         chain.given, chain.total = chain.given + new, total
         return new, mean
 

@@ -31,10 +31,8 @@ class Mitsuba:
     """Loads the scene, and hands tiles to the variant that fits."""
 
     def __init__(self, init):
-        warnings, wanted, gpu = [], init.get("device") or "cpu", None
-        if wanted != "cpu":
-            gpu, note = host.pick(wanted, *host.gpus_of(__file__))
-            warnings += [note] if note else []
+        warnings, wanted = [], init.get("device")
+        gpu = host.pick(wanted, lambda: host.gpus_of(__file__), warnings)
         if gpu:
             # The only one that Dr.Jit will see, which takes the first
             visible = os.environ.get("CUDA_VISIBLE_DEVICES")
@@ -42,8 +40,8 @@ class Mitsuba:
         import mitsuba as mi
 
         if gpu:
-            gpu, note = host.pick("auto" if wanted == "auto" else "gpu", [gpu], "", lambda _: try_variant(mi, CUDA))
-            warnings += [note] if note else []
+            it = [gpu], ""
+            gpu = host.pick("auto" if wanted == "auto" else "gpu", lambda: it, warnings, lambda _: try_variant(mi, CUDA))
         variant = CUDA if gpu else choose_variant(mi, init["options"]["variant"], warnings)
         collector = collect_warnings(mi, warnings)
         if init["threads"] is not None:
@@ -87,8 +85,7 @@ class Mitsuba:
             total = total + np.array(image)[:, :, -6:].astype(np.float64) * number
             done += number
         mean = total / samples
-        albedo, normal = mean[:, :, :3], mean[:, :, 3:]
-        return [np.ascontiguousarray(part, np.float32) for part in (np.clip(albedo, 0, 1), normal)]
+        return np.clip(mean[:, :, :3], 0, 1), mean[:, :, 3:]
 
     @staticmethod
     def gpus():
@@ -473,14 +470,13 @@ class Scalar:
         return [(tile["samples"], self.mean(tile)) for tile in tiles]
 
     def mean(self, tile):
-        mi, np = self.mi, self.np
         self.crop["film.crop_size"] = [tile["width"], tile["height"]]
         self.crop["film.crop_offset"] = [self.film["x"] + tile["x"], self.film["y"] + tile["y"]]
         self.crop.update()
         seed = self.seed_for(tile["width"], tile["height"])
         image = self.integrator.render(self.scene, sensor=self.sensor, seed=seed, spp=tile["samples"])
         # Colour comes first, before whatever else an integrator puts out.
-        return np.ascontiguousarray(np.array(image)[:, :, :3], np.float32)
+        return self.np.array(image)[:, :, :3]
 
     def seed_for(self, width, height):
         """The seed that makes a window of this size begin at the next stream that is free."""

@@ -20,7 +20,7 @@ A filter, such as a denoiser, has a name in `info`, and one method instead:
 
         def filter(self, width, height, frames): ...   # an array each; a frame: bytes of float32 RGB by name
 
-With `gpus()`, a static method that returns what `pick` takes, a class says which GPUs it could use; `HOST_SCRIPT devices` prints
+With `gpus()`, a static method as `pick` takes it, a class says which GPUs it could use; `HOST_SCRIPT devices` prints
 them. init["device"] is what the user has asked for: "auto", "cpu", "gpu", a number, or a part of a name; None if nothing.
 
 `TileError` blames a failure on a tile; `rectangles` joins tiles for renderers to which every piece costs a start.
@@ -55,14 +55,15 @@ class TileError(Exception):
         self.tile = tile
 
 
-def pick(wanted, gpus, nowhere, trial=lambda gpu: None):
-    """The GPU that `wanted` asks for, None for the processor, and a line for the user, None if there is nothing to say.
+def pick(wanted, gpus, warnings, trial=lambda gpu: None):
+    """The GPU that `wanted` asks for, None for the processor; a line for the user, if any, is added to `warnings`.
 
-    wanted: as in init["device"], not None. gpus: those that the renderer could use, best first, each a kind (such as "CUDA"), a
-    name, and whatever the renderer knows it by. nowhere: why there are none. trial: raises if one does not work. `auto` goes on to
-    the next GPU then, and to the processor; whatever else is asked for is an error if it does not work."""
-    if wanted == "cpu":
-        return None, None
+    wanted: as in init["device"]; None is "cpu". gpus: a function that returns those that the renderer could use, best first, each a
+    kind (such as "CUDA"), a name, and whatever the renderer knows it by, and why there are none. trial: raises if one does not work.
+    `auto` goes on to the next GPU then, and to the processor; whatever else is asked for is an error if it does not work."""
+    if wanted in (None, "cpu"):
+        return None
+    gpus, nowhere = gpus()
     some = gpus
     if wanted.isdigit():
         some = gpus[int(wanted) :][:1]
@@ -72,18 +73,19 @@ def pick(wanted, gpus, nowhere, trial=lambda gpu: None):
     for gpu in some:
         try:
             trial(gpu)
-            return gpu, None
+            return gpu
         except Exception as error:
             reasons.append(f"{gpu[1]} ({gpu[0]}): {(str(error).strip() or type(error).__name__).splitlines()[-1]}")
     there = ", ".join(f"{number} is {gpu[1]} ({gpu[0]})" for number, gpu in enumerate(gpus))
     why = "; ".join(reasons) or (nowhere if not gpus else f"of the GPUs, {there}")
     if wanted == "auto":
-        return None, f"the processor does it, since no GPU works here: {why}"
+        warnings.append(f"the processor does it, since no GPU works here: {why}")
+        return None
     raise ValueError(f"device {wanted} cannot be used: {why}; `auto` takes the processor where no GPU works")
 
 
 def cuda_gpus():
-    """The GPUs of NVIDIA's driver, as `pick` takes them, and why there are none. Loads nothing but the driver."""
+    """The GPUs of NVIDIA's driver, for `pick`. Loads nothing but the driver."""
     import ctypes
 
     try:
@@ -102,7 +104,7 @@ def cuda_gpus():
 
 
 def gpus_of(script):
-    """What `HOST_SCRIPT devices` says, as `pick` takes it; in a process of its own, since a driver that has been looked at does not
+    """What `HOST_SCRIPT devices` says, for `pick`; in a process of its own, since a driver that has been looked at does not
     forget the devices it has shown."""
     import subprocess
 
@@ -271,8 +273,8 @@ def _check(tile, info):
 
 
 def _bytes(array, width, height):
-    """The bytes of an array of float32, without a copy where it lies in one piece."""
-    view = memoryview(array)
+    """The bytes of an array of numbers, without a copy where they are float32 in one piece."""
+    view = memoryview(array.astype("<f4", copy=False) if hasattr(array, "astype") else array)
     data = view.cast("B") if view.c_contiguous else memoryview(view.tobytes())
     if data.nbytes != 12 * width * height:
         raise ValueError(f"{data.nbytes} bytes for {width}x{height} pixels of three float32")

@@ -7,7 +7,6 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import array
-import json
 import struct
 import time
 
@@ -39,6 +38,21 @@ def send(header, payload=0):
     time.sleep(1000)
 
 
+# Headers, and the length of the payload that they announce
+REPLIES = {
+    "announce a long payload": (b"{}", 0xFFFFFFFF),
+    "announce a pixel too many": (b"{}", 12 * 48 * 40 + 12),
+    "announce a long header": (b" " * ((1 << 20) + 1),),
+    "send no JSON": (b"\xff{",),
+    "send a list": (b"[1, 2]",),
+    "nest deeply": (b'{"x":' * 200000,),
+    "send strange counts": (b'{"ok": true, "samples": [-1, 1e99, 3, 4]}',),
+    "send too few counts": (b'{"ok": true, "samples": [0]}',),
+    "claim many samples": (b'{"ok": true, "samples": [1, 1, 1, 4294967295]}',),
+    "send no counts": (b'{"ok": true}',),
+}
+
+
 class Fake:
     @staticmethod
     def gpus():
@@ -53,7 +67,8 @@ class Fake:
 
     def __init__(self, init):
         self.seed, self.options = init["seed"], init["options"]
-        gpu, note = host.pick(init["device"] or "cpu", *self.gpus(), self.trial)
+        warnings = ["max_depth %s, threads %s" % (init["max_depth"], init["threads"])]
+        gpu = host.pick(init["device"], self.gpus, warnings, self.trial)
         self.info = {
             "name": "Fake 1" + (" on " + gpu[1] if gpu else ""),
             "width": init["width"] or 48,
@@ -61,7 +76,7 @@ class Fake:
             "unit": "samples-per-pixel",
             "repeats": "samples",
             "stratified": True,
-            "warnings": ["max_depth %s, threads %s" % (init["max_depth"], init["threads"])] + ([note] if note else []),
+            "warnings": warnings,
         }
         starts = 0
         if "pids" in self.options:
@@ -166,26 +181,9 @@ class Fake:
         if self.told("close standard output"):
             os.close(replies)
             time.sleep(1000)
-        if self.told("announce a long payload"):
-            send(b"{}", 0xFFFFFFFF)
-        if self.told("announce a pixel too many"):
-            send(b"{}", 12 * 48 * 40 + 12)
-        if self.told("announce a long header"):
-            send(b" " * ((1 << 20) + 1))
-        if self.told("send no JSON"):
-            send(b"\xff{")
-        if self.told("send a list"):
-            send(b"[1, 2]")
-        if self.told("nest deeply"):
-            send(b'{"x":' * 200000)
-        if self.told("send strange counts"):
-            send(json.dumps({"ok": True, "samples": [-1, 1e99, 3, 4]}).encode())
-        if self.told("send too few counts"):
-            send(json.dumps({"ok": True, "samples": [0]}).encode())
-        if self.told("claim many samples"):
-            send(json.dumps({"ok": True, "samples": [1, 1, 1, 0xFFFFFFFF]}).encode())
-        if self.told("send no counts"):
-            send(json.dumps({"ok": True}).encode())
+        for how, reply in REPLIES.items():
+            if self.told(how):
+                send(*reply)
         if self.told("stop in the middle"):
             os.write(replies, struct.pack("<II", 100, 0) + b"{")
             os._exit(0)
