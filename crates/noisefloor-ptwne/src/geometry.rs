@@ -32,6 +32,13 @@ pub(crate) struct Group {
     pub(crate) frame: u32,
 }
 
+impl Group {
+    pub(crate) fn new(first: u32, material: u32, light: u32) -> Self {
+        let [corners, normals, uvs, second_uvs, colours, alphas, tangents, frame] = [NO; 8];
+        Self { first, material, light, corners, normals, uvs, second_uvs, colours, alphas, tangents, frame }
+    }
+}
+
 /// What smooth or textured surfaces have at their corners.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Vertices {
@@ -59,6 +66,13 @@ impl Geometry {
         &self.groups[self.group_of[prim as usize] as usize]
     }
 
+    /// What a planar surface of `group` has at its corners, in a list where the group's begins at `first`.
+    #[inline]
+    fn corners<T: Copy>(&self, group: &Group, prim: u32, list: &[T], first: u32) -> [T; 3] {
+        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
+        corners.map(|i| list[(first + i) as usize])
+    }
+
     /// Texture coordinates of a planar surface of `group`, at `uv` along its edges.
     #[inline]
     pub(crate) fn texture_coordinates(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> Coordinates {
@@ -68,9 +82,8 @@ impl Geometry {
                 _ => [u, v],
             });
         }
-        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
         let pair = |uvs: u32| -> [f32; 2] {
-            let [a, b, c] = corners.map(|i| self.vertices.uvs[(uvs + i) as usize]);
+            let [a, b, c] = self.corners(group, prim, &self.vertices.uvs, uvs);
             std::array::from_fn(|i| a[i] + (b[i] - a[i]) * u + (c[i] - a[i]) * v)
         };
         let first = pair(group.uvs);
@@ -92,38 +105,31 @@ impl Geometry {
 
     /// The shading normal of a planar surface of `group`, which has normals; none if they cancel.
     #[inline]
-    pub(crate) fn shading_normal(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> Option<Vec3> {
-        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
-        let [a, b, c] =
-            corners.map(|i| Vec3::from_array(self.vertices.normals[(group.normals + i) as usize]));
-        (a * (1.0 - u - v) + b * u + c * v).try_normalize()
+    pub(crate) fn shading_normal(&self, group: &Group, prim: u32, uv: [f32; 2]) -> Option<Vec3> {
+        let normals = self.corners(group, prim, &self.vertices.normals, group.normals);
+        between(normals.map(Vec3::from_array), uv).try_normalize()
     }
 
     /// The colour between the corners of a planar surface of `group`, which has colours.
     #[inline(never)]
-    pub(crate) fn tint(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> Vec3 {
-        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
-        let [a, b, c] =
-            corners.map(|i| Vec3::from_array(self.vertices.colours[(group.colours + i) as usize]));
+    pub(crate) fn tint(&self, group: &Group, prim: u32, uv: [f32; 2]) -> Vec3 {
+        let colours = self.corners(group, prim, &self.vertices.colours, group.colours);
         // The edges are widened a little
-        (a * (1.0 - u - v) + b * u + c * v).clamp(Vec3::ZERO, Vec3::ONE)
+        between(colours.map(Vec3::from_array), uv).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     /// The alpha between the corners of a planar surface of `group`, which has alphas.
     #[inline(never)]
     pub(crate) fn alpha(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> f32 {
-        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
-        let [a, b, c] = corners.map(|i| self.vertices.alphas[(group.alphas + i) as usize]);
+        let [a, b, c] = self.corners(group, prim, &self.vertices.alphas, group.alphas);
         (a * (1.0 - u - v) + b * u + c * v).clamp(0.0, 1.0)
     }
 
     /// The tangent between the corners of a planar surface of `group`, which has tangents, and the sign of
     /// its bitangent.
-    pub(crate) fn tangent(&self, group: &Group, prim: u32, [u, v]: [f32; 2]) -> (Vec3, f32) {
-        let corners = self.vertices.corners[(group.corners + prim - group.first) as usize];
-        let rows = corners.map(|i| self.vertices.tangents[(group.tangents + i) as usize]);
-        let [a, b, c] = rows.map(|[x, y, z, _]| Vec3::new(x, y, z));
-        (a * (1.0 - u - v) + b * u + c * v, rows[0][3])
+    pub(crate) fn tangent(&self, group: &Group, prim: u32, uv: [f32; 2]) -> (Vec3, f32) {
+        let rows = self.corners(group, prim, &self.vertices.tangents, group.tangents);
+        (between(rows.map(|[x, y, z, _]| Vec3::new(x, y, z)), uv), rows[0][3])
     }
 
     /// Memory that it takes, in bytes.
@@ -139,6 +145,12 @@ impl Geometry {
             + size_of_val(tangents.as_slice())
             + size_of_val(self.frames.as_slice())
     }
+}
+
+/// A value between those of the three corners.
+#[inline]
+fn between([a, b, c]: [Vec3; 3], [u, v]: [f32; 2]) -> Vec3 {
+    a * (1.0 - u - v) + b * u + c * v
 }
 
 /// Distance from the middle of a disk, and the angle there as a share of a turn.

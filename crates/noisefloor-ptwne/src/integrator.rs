@@ -37,6 +37,14 @@ pub enum Estimator {
     BruteForce,
 }
 
+impl Estimator {
+    /// The weight of a light sample of density `pdf` where scattered rays have the density `own`.
+    #[inline(always)]
+    fn light_weight(self, pdf: f32, own: f32) -> f32 {
+        if self == Self::Mis { power_heuristic(pdf, own) } else { 1.0 }
+    }
+}
+
 /// Samples the radiance along a camera ray.
 pub(crate) type SampleRadiance = fn(&Scene, Settings, Ray, &mut Sampler, &mut Stack) -> Vec3;
 
@@ -239,13 +247,12 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         throughput: Vec3,
         sum: &mut Vec3,
     ) -> Option<Scattered> {
-        let mis = self.settings.estimator == Estimator::Mis;
+        let estimator = self.settings.estimator;
         let receiver = Receiver::diffuse(surface.leave(surface.flat), surface.normal);
         *sum += throughput
             * self.next_event::<false>(surface, receiver, |dir, pdf| {
                 let lambert = dir.dot(surface.normal).max(0.0) * FRAC_1_PI;
-                let weight = if mis { power_heuristic(pdf, lambert) } else { 1.0 };
-                albedo * (lambert * weight)
+                albedo * (lambert * estimator.light_weight(pdf, lambert))
             });
         let [u, v, roulette, _] = self.sampler.four();
         let local = math::cosine_hemisphere([u, v]);
@@ -269,7 +276,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let frame = surface.frame();
         let wo = frame.to_local(-ray.dir);
         let glossy = surface.glossy(wo.z)?;
-        let mis = self.settings.estimator == Estimator::Mis;
+        let estimator = self.settings.estimator;
         let receiver = if THROUGH && glossy.transmits() {
             Receiver::all_round(surface.position)
         } else {
@@ -283,7 +290,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
                     return Vec3::ZERO;
                 }
                 let (f_cos, bsdf_pdf) = glossy.eval(wo, wi);
-                f_cos * if mis { power_heuristic(pdf, bsdf_pdf) } else { 1.0 }
+                f_cos * estimator.light_weight(pdf, bsdf_pdf)
             });
         let [pick, u, v, roulette] = self.sampler.four();
         let (wi, weight, pdf) = glossy.sample(wo, [pick, u, v])?;
@@ -307,7 +314,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
         let receiver = Receiver::all_round(surface.position);
         let frame = surface.frame();
         let wo = frame.to_local(-ray.dir);
-        let mis = self.settings.estimator == Estimator::Mis;
+        let estimator = self.settings.estimator;
         *sum += throughput
             * self.next_event::<true>(surface, receiver, |dir, pdf| {
                 let wi = frame.to_local(dir);
@@ -315,7 +322,7 @@ impl<'a, const OPACITY: bool> Path<'a, OPACITY> {
                     return Vec3::ZERO;
                 }
                 let (f_cos, bsdf_pdf) = glass.eval(wo, wi);
-                f_cos * if mis { power_heuristic(pdf, bsdf_pdf) } else { 1.0 }
+                f_cos * estimator.light_weight(pdf, bsdf_pdf)
             });
         let [pick, u, v, roulette] = self.sampler.four();
         let (wi, weight, pdf) = glass.sample(wo, [pick, u, v])?;

@@ -111,6 +111,11 @@ impl<'a> Glossy<'a> {
         }
     }
 
+    /// Facets to start from that are no metal.
+    fn no_metal(ggx: Ggx) -> Self {
+        Self { metal_share: 0.0, ..Self::metal(&Fresnel::None, Vec3::ZERO, ggx) }
+    }
+
     pub(crate) fn plastic(
         coat: &'a Coat,
         diffuse: Vec3,
@@ -124,21 +129,13 @@ impl<'a> Glossy<'a> {
         let (reflected, inside) =
             ((1.0 - passed) * math::luminance(specular), passed * math::luminance(diffuse));
         Self {
-            ggx,
-            fresnel: &Fresnel::None,
-            metal: Vec3::ZERO,
-            metal_share: 0.0,
             ior: coat.ior,
             specular,
             below: Below::Coat(coat),
-            clearcoat: None,
             base: coat.base(alpha, diffuse, nonlinear) * passed,
-            through: Vec3::ZERO,
-            mirror: Vec3::ZERO,
             facet: lobe_probability(reflected, inside),
-            transmission: 0.0,
-            mirrored: 0.0,
             smooth: alpha < MIN_ROUGHNESS,
+            ..Self::no_metal(ggx)
         }
     }
 
@@ -153,8 +150,7 @@ impl<'a> Glossy<'a> {
             below: Below::Schlick,
             base: diffuse * FRAC_1_PI,
             facet: lobe_probability(math::luminance(reflected), math::luminance(below)),
-            metal_share: 0.0,
-            ..Self::metal(&Fresnel::None, Vec3::ZERO, Ggx::of(alpha, Facets::GgxUncorrelated))
+            ..Self::no_metal(Ggx::of(alpha, Facets::GgxUncorrelated))
         }
     }
 
@@ -200,21 +196,16 @@ impl<'a> Glossy<'a> {
         let facet = (1.0 - mirrored) * lobe_probability(facets, over + under);
         let transmission = (1.0 - mirrored - facet) * lobe_probability(under, over);
         Self {
-            ggx,
-            fresnel: &Fresnel::None,
-            metal: Vec3::ZERO,
-            metal_share: 0.0,
             ior,
             specular,
             below,
-            clearcoat: None,
             base: diffuse * FRAC_1_PI,
             through: through * FRAC_1_PI,
             mirror,
             facet,
             transmission,
             mirrored,
-            smooth: false,
+            ..Self::no_metal(ggx)
         }
     }
 

@@ -111,9 +111,9 @@ impl SceneBuilder {
         material: MaterialId,
         emission: Option<Emission>,
     ) -> Result<(), SceneError> {
-        let [corner, e1, e2] = [position(corner)?, position(e1)?, position(e2)?];
-        let uvs = [[0.0, 0.0], [e1.length(), 0.0], [0.0, e2.length()]];
-        self.single(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), NO, material, emission)
+        let [u, v] = [e1, e2].map(|edge| glam::Vec3::from(edge).length());
+        let uvs = [[0.0, 0.0], [u, 0.0], [0.0, v]];
+        self.mapped_parallelogram(corner, [e1, e2], uvs, material, emission)
     }
 
     /// As [`SceneBuilder::parallelogram`], with the texture coordinates of the corner and of the ends of its edges.
@@ -217,38 +217,16 @@ impl SceneBuilder {
         if with_vertices {
             let vertices = &mut self.parts.geometry.vertices;
             group.corners = index(vertices.corners.len())?;
-            if !mesh.normals.is_empty() {
-                group.normals = index(vertices.normals.len())?;
-                let unit =
-                    |n: &[f32; 3]| glam::Vec3::from(*n).as_dvec3().normalize_or_zero().as_vec3().to_array();
-                room(&mut vertices.normals, mesh.normals.len())?;
-                vertices.normals.extend(mesh.normals.iter().map(unit));
+            let unit =
+                |n: &[f32; 3]| glam::Vec3::from(*n).as_dvec3().normalize_or_zero().as_vec3().to_array();
+            group.normals = append(&mut vertices.normals, mesh.normals.iter().map(unit))?;
+            group.uvs = append(&mut vertices.uvs, mesh.uvs.iter().copied())?;
+            if group.uvs != NO {
+                group.second_uvs = append(&mut vertices.uvs, mesh.second_uvs.iter().copied())?;
             }
-            if !mesh.uvs.is_empty() {
-                group.uvs = index(vertices.uvs.len())?;
-                room(&mut vertices.uvs, mesh.uvs.len())?;
-                vertices.uvs.extend(mesh.uvs);
-                if !mesh.second_uvs.is_empty() {
-                    group.second_uvs = index(vertices.uvs.len())?;
-                    room(&mut vertices.uvs, mesh.second_uvs.len())?;
-                    vertices.uvs.extend(mesh.second_uvs);
-                }
-            }
-            if !mesh.colours.is_empty() {
-                group.colours = index(vertices.colours.len())?;
-                room(&mut vertices.colours, mesh.colours.len())?;
-                vertices.colours.extend(mesh.colours);
-            }
-            if !mesh.alphas.is_empty() {
-                group.alphas = index(vertices.alphas.len())?;
-                room(&mut vertices.alphas, mesh.alphas.len())?;
-                vertices.alphas.extend(mesh.alphas);
-            }
-            if !mesh.tangents.is_empty() {
-                group.tangents = index(vertices.tangents.len())?;
-                room(&mut vertices.tangents, mesh.tangents.len())?;
-                vertices.tangents.extend(mesh.tangents);
-            }
+            group.colours = append(&mut vertices.colours, mesh.colours.iter().copied())?;
+            group.alphas = append(&mut vertices.alphas, mesh.alphas.iter().copied())?;
+            group.tangents = append(&mut vertices.tangents, mesh.tangents.iter().copied())?;
         }
         let surfaces = self.parts.surfaces.len() + mesh.indices.len();
         if surfaces > MAX_SURFACES {
@@ -313,22 +291,7 @@ impl SceneBuilder {
         });
         let light = if group_emission.is_some() { index(self.parts.lights.len())? } else { NO };
         let first = index(self.parts.surfaces.len())?;
-        Ok((
-            Group {
-                first,
-                material: material.0,
-                light,
-                corners: NO,
-                normals: NO,
-                uvs: NO,
-                second_uvs: NO,
-                colours: NO,
-                alphas: NO,
-                tangents: NO,
-                frame: NO,
-            },
-            group_emission,
-        ))
+        Ok((Group::new(first, material.0, light), group_emission))
     }
 
     /// Adds the group, if it has got any surfaces.
@@ -398,6 +361,17 @@ struct GroupEmission {
     radiance: Rgb,
     two_sided: bool,
     texture: u32,
+}
+
+/// Adds what corners of a mesh have, and returns the index of the first; [`NO`] if they have nothing.
+fn append<T>(to: &mut Vec<T>, rows: impl ExactSizeIterator<Item = T>) -> Result<u32, SceneError> {
+    if rows.len() == 0 {
+        return Ok(NO);
+    }
+    let first = index(to.len())?;
+    room(to, rows.len())?;
+    to.extend(rows);
+    Ok(first)
 }
 
 /// A count as an index.
