@@ -1,6 +1,6 @@
 //! The same seed gives the same samples, and other samples are independent.
 
-use crate::kit::batch;
+use crate::kit::{batch, source};
 use noisefloor::{ProgressiveSource, Request, TileGrid};
 use noisefloor_ptwne::{Filter, Ptwne, RenderError, RenderOptions, Sampling, scenes};
 use std::num::NonZeroUsize;
@@ -71,7 +71,7 @@ fn opacity_tests_change_nothing() {
     for name in ["cornell-box", "softbox", "courtyard", "glass-spheres", "plates", "grazing"] {
         let run = |forced: bool| {
             let scene = scenes::by_name(name).unwrap();
-            let mut source = Ptwne::new(scene, 24, 24, RenderOptions::default()).unwrap();
+            let mut source = source(scene, 24);
             if forced {
                 source.force_opacity_tests();
             }
@@ -165,7 +165,7 @@ fn background_tiles_trace_no_rays() {
         };
         b.environment(sky).unwrap();
     });
-    let mut source = Ptwne::new(scene, 96, 96, RenderOptions::default()).unwrap();
+    let mut source = source(scene, 96);
     let whole = batch(&mut source, 0, 4);
     assert_eq!(source.counts().background, 0);
     let tiles = TileGrid::new(96, 96, 32).unwrap().tiles();

@@ -1,6 +1,6 @@
 //! Direct light in closed form, and the ray-traced reference.
 
-use crate::kit::{agrees, batch, look, mean, scene};
+use crate::kit::{agrees, batch, look, mean, reference, scene, source};
 use noisefloor_ptwne::{
     Camera, Emission, Environment, EnvironmentMap, Estimator, Falloff, Gloss, ImageTexture, Lobes, Material,
     MaterialId, MaterialOptions, Mesh, Pixels, Ptwne, Punctual, RenderOptions, Scene, SceneBuilder, Sun,
@@ -29,9 +29,7 @@ pub(crate) fn lit(light: impl FnOnce(&mut SceneBuilder, MaterialId)) -> Scene {
 /// and sRGB over the logarithm is at most 0.19. That is 0.2 % for the mean of 16 pixels that see the same.
 pub(crate) fn check(scene: &Scene, expected: f64) {
     check_samples(scene, expected);
-    let mut source = Ptwne::new(scene.clone(), 4, 4, RenderOptions::default()).unwrap();
-    let pixels = source.reference().unwrap().pixels;
-    let reference = pixels.iter().map(|p| f64::from(p[0])).sum::<f64>() / 16.0;
+    let reference = reference(scene.clone(), 4, 0);
     assert!((reference - expected).abs() < 1e-2 * expected, "reference {reference}, expected {expected}");
 }
 
@@ -57,9 +55,13 @@ fn corner(a: f64, b: f64) -> f64 {
     (a / p * (b / p).atan() + b / q * (a / q).atan()) / (2.0 * std::f64::consts::PI)
 }
 
+/// Of x −0.5…1.5, z −1…0.5 at height 2: four rectangles with a corner above the origin.
+fn panel() -> f64 {
+    [(0.25, 0.5), (0.75, 0.5), (0.25, 0.25), (0.75, 0.25)].iter().map(|&(a, b)| corner(a, b)).sum()
+}
+
 #[test]
 fn a_rectangle_lights_by_its_form_factor() {
-    // x −0.5…1.5, z −1…0.5 at height 2: four rectangles with a corner above the origin
     let scene = lit(|b, m| {
         b.parallelogram(
             [-0.5, 2.0, -1.0],
@@ -70,10 +72,8 @@ fn a_rectangle_lights_by_its_form_factor() {
         )
         .unwrap();
     });
-    let f: f64 =
-        [(0.25, 0.5), (0.75, 0.5), (0.25, 0.25), (0.75, 0.25)].iter().map(|&(a, b)| corner(a, b)).sum();
-    check(&scene, 0.5 * 3.0 * f);
-    check_brute_force(&scene, 0.5 * 3.0 * f);
+    check(&scene, 0.5 * 3.0 * panel());
+    check_brute_force(&scene, 0.5 * 3.0 * panel());
 }
 
 #[test]
@@ -85,9 +85,7 @@ fn triangles_light_like_the_rectangle_they_make() {
         ..Default::default()
     };
     let scene = lit(|b, m| assert_eq!(b.mesh(&mesh, m, Some(Emission::front([3.0; 3]))), Ok(0)));
-    let f: f64 =
-        [(0.25, 0.5), (0.75, 0.5), (0.25, 0.25), (0.75, 0.25)].iter().map(|&(a, b)| corner(a, b)).sum();
-    check(&scene, 0.5 * 3.0 * f);
+    check(&scene, 0.5 * 3.0 * panel());
 }
 
 /// A ball of radius r at distance d wholly above the horizon: E = πL (r/d)² cos θ.
@@ -360,9 +358,7 @@ fn balls_stop_rays_on_both_sides() {
         })
     };
     let seen = |scene: Scene| {
-        let mut source = Ptwne::new(scene.clone(), 16, 16, RenderOptions::default()).unwrap();
-        let quick = source.reference().unwrap().pixels;
-        let quick = quick.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>() / quick.len() as f64;
+        let quick = reference(scene.clone(), 16, 1);
         (mean(scene, 16, 64, 16, 0, RenderOptions::default()), quick)
     };
     let (traced, quick) = seen(ball(0.0, [0.4; 3].into(), 0.0));
@@ -389,7 +385,7 @@ fn backs_of_one_sided_surfaces_are_black() {
             b.parallelogram([-9.0, -9.0, 0.0], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0], m, None).unwrap();
             b.environment(Environment::constant([1.0; 3])).unwrap();
         });
-        let mut source = Ptwne::new(scene, 4, 4, RenderOptions::default()).unwrap();
+        let mut source = source(scene, 4);
         let mut all = batch(&mut source, 0, 4);
         all.extend(source.reference().unwrap().pixels);
         assert!(all.iter().flatten().all(|x| (x - expected).abs() < 1e-5), "{all:?}");

@@ -1,17 +1,17 @@
 //! All samples are finite and non-negative, in any scene.
 
-use crate::kit::{batch, look, scene};
+use crate::kit::{batch, look, scene, source};
 use noisefloor_ptwne::{Emission, Environment, Material, Mesh, Ptwne, RenderOptions, Scene, Sun, scenes};
 use std::sync::Arc;
 
 fn check(scene: Scene, samples: u64) {
     let scene = Arc::new(scene);
-    let mut source = Ptwne::new(scene.clone(), 32, 32, RenderOptions::default()).unwrap();
+    let mut source = source(scene.clone(), 32);
     let mut all = batch(&mut source, 0, samples);
     let counts = source.counts();
     assert_eq!((counts.samples, counts.dropped, counts.clamped), (32 * 32 * samples, 0, 0));
     // References take thousands of samples per pixel where light is hard to find
-    let mut small = Ptwne::new(scene, 8, 8, RenderOptions::default()).unwrap();
+    let mut small = crate::kit::source(scene, 8);
     all.extend(small.reference().unwrap().pixels);
     let good = |v: &f32| v.is_finite() && *v >= 0.0;
     assert!(all.iter().flatten().all(good), "{:?}", all.iter().find(|p| !p.iter().all(good)));
@@ -87,7 +87,7 @@ fn an_empty_scene_is_its_sky() {
     let empty = scene(look([0.0; 3], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], 40.0), |b| {
         b.environment(Environment::constant([0.25, 0.5, 1.0])).unwrap();
     });
-    let mut source = Ptwne::new(empty, 8, 8, RenderOptions::default()).unwrap();
+    let mut source = source(empty, 8);
     assert!(batch(&mut source, 0, 3).iter().all(|p| *p == [0.25, 0.5, 1.0]));
     assert!(source.reference().unwrap().pixels.iter().all(|p| *p == [0.25, 0.5, 1.0]));
 }

@@ -1,6 +1,6 @@
 //! Albedo and normals of first hits, against what is known of the scene.
 
-use crate::kit::{batch, look, scene};
+use crate::kit::{batch, look, scene, source};
 use noisefloor::{ProgressiveSource, source::FirstHits};
 use noisefloor_ptwne::{Emission, Environment, Material, Ptwne, RenderOptions, Scene, scenes};
 use std::num::NonZeroUsize;
@@ -146,9 +146,7 @@ fn rays_go_where_they_disagree() {
             b.sphere([0.0; 3], 1.0, paint, None).unwrap();
         })
     };
-    let with = |index, spp| {
-        Ptwne::new(ball(), 40, 40, RenderOptions::default()).unwrap().first_hits(index, spp).unwrap().unwrap()
-    };
+    let with = |index, spp| source(ball(), 40).first_hits(index, spp).unwrap().unwrap();
     let (few, many) = (with(0, 16), with(0, 256));
     let same = few.albedo.iter().zip(&many.albedo).filter(|(a, b)| a == b).count();
     assert!((1300..1600).contains(&same), "{same} of 1600");

@@ -1,14 +1,12 @@
 //! Instances, against copies and against mathematics.
 
-use crate::kit::{agrees, batch, look, mean, scene};
+use crate::kit::{UP, agrees, batch, look, mean, scene, source};
 use glam::{DAffine3, DMat3, DVec3, EulerRot, Vec3};
 use noisefloor::ProgressiveSource;
 use noisefloor_ptwne::{
     Emission, Environment, ImageTexture, Material, MaterialId, MaterialOptions, Mesh, Pixels, Ptwne, Relief,
     RenderOptions, Scene, SceneBuilder, SceneError, Texture,
 };
-
-const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
 fn rows(m: &DAffine3) -> [[f64; 4]; 3] {
     [0, 1, 2].map(|i| [m.matrix3.x_axis[i], m.matrix3.y_axis[i], m.matrix3.z_axis[i], m.translation[i]])
@@ -143,7 +141,7 @@ fn instances_look_like_copies() {
         assert_eq!(shared.surfaces() - 2, inside);
 
         let hits = |scene: &Scene| {
-            let mut source = Ptwne::new(scene.clone(), 64, 64, RenderOptions::default()).unwrap();
+            let mut source = source(scene.clone(), 64);
             source.first_hits(0, 1).unwrap().unwrap()
         };
         let (a, b) = (hits(&shared), hits(&copied));
@@ -194,7 +192,7 @@ fn the_same_samples_agree() {
                 places.iter().for_each(|place| Sheet::new().moved(place).add(b, false, m));
             }
         });
-        let mut source = Ptwne::new(scene, 48, 48, RenderOptions::default()).unwrap();
+        let mut source = source(scene, 48);
         batch(&mut source, 0, 4)
     });
     let [a, b] = &pictures;
@@ -232,8 +230,7 @@ fn stretched_spheres_are_ellipsoids() {
             b.instance(object, rows(&matrix)).unwrap();
         });
         assert_eq!((scene.surfaces(), scene.instances()), (1, 1));
-        let seen =
-            Ptwne::new(scene, 1, 1, RenderOptions::default()).unwrap().first_hits(0, 16).unwrap().unwrap();
+        let seen = source(scene, 1).first_hits(0, 16).unwrap().unwrap();
         let off = (Vec3::from(seen.normal[0]).as_dvec3() - normal).length();
         assert!(off < 1e-3, "{k}: {:?}, not {normal}", seen.normal[0]);
     }

@@ -1,12 +1,9 @@
 //! Cameras and lamps in media of different indices of refraction, against known answers: radiance L over η²
 //! stays the same across boundaries (Veach 1997, §5.2).
 
-use crate::kit::{agrees, look, mean, scene};
-use noisefloor_ptwne::{
-    Emission, Environment, Estimator, Material, Ptwne, RenderOptions, Scene, SceneBuilder,
-};
+use crate::kit::{UP, agrees, look, mean, scene, source};
+use noisefloor_ptwne::{Emission, Environment, Estimator, Material, RenderOptions, Scene, SceneBuilder};
 
-const UP: [f32; 3] = [0.0, 1.0, 0.0];
 /// What a boundary of index 1.5 reflects at normal incidence.
 const F: f64 = 0.04;
 
@@ -66,8 +63,7 @@ fn lamps_shine_across_boundaries() {
                 agrees(seen(nearly_smooth), expected, 2e-3);
             }
         }
-        let mut source =
-            Ptwne::new(lamp_behind(&boundaries, smooth), 4, 4, RenderOptions::default()).unwrap();
+        let mut source = source(lamp_behind(&boundaries, smooth), 4);
         let reference = f64::from(source.reference().unwrap().pixels[5][0]);
         // Its branches end at a weight of 2e-3
         assert!((reference - expected).abs() < 2e-3 * expected, "{reference} {expected}");

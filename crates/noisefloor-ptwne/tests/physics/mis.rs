@@ -1,6 +1,6 @@
 //! Next event estimation, scattering, and both together: they change the noise, not the mean.
 
-use crate::kit::{batch, look, scene};
+use crate::kit::{batch, look, mean_of, scene};
 use noisefloor_ptwne::{
     Emission, EnvironmentMap, Estimator, Material, Mesh, Ptwne, RenderOptions, Scene, scenes,
 };
@@ -30,12 +30,7 @@ fn parts(scene: &Scene, estimator: Estimator, samples: u64) -> [(f64, f64); PART
         }));
         assert_eq!(source.counts().dropped, 0);
     }
-    let n = means.len() as f64;
-    std::array::from_fn(|part| {
-        let mean = means.iter().map(|m| m[part]).sum::<f64>() / n;
-        let variance = means.iter().map(|m| (m[part] - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        (mean, (variance / n).sqrt())
-    })
+    std::array::from_fn(|part| mean_of(&means.iter().map(|m| m[part]).collect::<Vec<f64>>()))
 }
 
 /// Asserts that all three estimators agree in every part of the picture, each pair at five standard errors.

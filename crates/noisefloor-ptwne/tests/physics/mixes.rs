@@ -1,7 +1,7 @@
-use crate::kit::{agrees, batch, mean, scene};
+use crate::kit::{agrees, batch, mean, reference, scene, source};
 use noisefloor_ptwne::{
-    Camera, Environment, Material, MaterialId, MaterialOptions, Optics, Ptwne, RenderOptions, Sampling,
-    Scene, SceneBuilder, Texture,
+    Camera, Environment, Material, MaterialId, MaterialOptions, Optics, RenderOptions, Sampling, Scene,
+    SceneBuilder, Texture,
 };
 
 const CAMERA: Camera =
@@ -9,13 +9,13 @@ const CAMERA: Camera =
 
 /// What fills the picture, in a sky of radiance 1: of a perspective view; of a parallel one, whose rays all have one
 /// direction and length; and of a parallel one on a tilted plane.
-fn views(fill: impl Fn(&mut SceneBuilder) -> MaterialId) -> [Scene; 3] {
+fn views(mixes: Mixes) -> [Scene; 3] {
     [(false, 0.0), (true, 0.0), (true, 3.0)].map(|(parallel, tilt)| {
         scene(CAMERA, |b| {
             if parallel {
                 b.optics(Optics { parallel_height: Some(2.0), ..Optics::default() }).unwrap();
             }
-            let material = fill(b);
+            let material = mixed(b, mixes);
             b.parallelogram([-9.0, -9.0, -tilt], [18.0, 0.0, 2.0 * tilt], [0.0, 18.0, 0.0], material, None)
                 .unwrap();
             b.environment(Environment::constant([1.0; 3])).unwrap();
@@ -23,57 +23,27 @@ fn views(fill: impl Fn(&mut SceneBuilder) -> MaterialId) -> [Scene; 3] {
     })
 }
 
-fn red_and_green(b: &mut SceneBuilder) -> [MaterialId; 2] {
-    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|colour| b.material(Material::diffuse(colour)).unwrap())
+/// The last of some mixes.
+fn mixed(b: &mut SceneBuilder, mixes: Mixes) -> MaterialId {
+    let plain = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Material::diffuse);
+    let mut all = plain.map(|colour| b.material(colour).unwrap()).to_vec();
+    for (first, second, share) in mixes {
+        let (share, options) = (Texture::Colour([*share; 3]), MaterialOptions::default());
+        all.push(b.mixed_material(all[*first], all[*second], share, options).unwrap());
+    }
+    all[all.len() - 1]
 }
 
-fn mixed(b: &mut SceneBuilder, [first, second]: [MaterialId; 2], share: f32) -> MaterialId {
-    b.mixed_material(first, second, Texture::Colour([share; 3]), MaterialOptions::default()).unwrap()
-}
-
-type Build = fn(&mut SceneBuilder) -> MaterialId;
+/// Mixes of two materials of those before them, by their share of the second, where the first two are red and green.
+type Mixes = &'static [(usize, usize, f32)];
 
 /// A mix, one in the first and one in the second part of another, and one of mixes: the share of green.
-const MIXES: [(Build, f64); 5] = [
-    (
-        |b| {
-            let parts = red_and_green(b);
-            mixed(b, parts, 0.25)
-        },
-        0.25,
-    ),
-    (
-        |b| {
-            let parts = red_and_green(b);
-            mixed(b, parts, 0.75)
-        },
-        0.75,
-    ),
-    (
-        |b| {
-            let parts = red_and_green(b);
-            let inner = mixed(b, parts, 0.5);
-            mixed(b, [parts[0], inner], 0.5)
-        },
-        0.25,
-    ),
-    (
-        |b| {
-            let parts = red_and_green(b);
-            let inner = mixed(b, parts, 0.5);
-            mixed(b, [inner, parts[0]], 0.5)
-        },
-        0.25,
-    ),
-    (
-        |b| {
-            let parts = red_and_green(b);
-            let inner = mixed(b, parts, 0.125);
-            let other = mixed(b, [inner, parts[1]], 0.25);
-            mixed(b, [inner, other], 0.5)
-        },
-        0.125 * 0.875 + 0.125,
-    ),
+const MIXES: [(Mixes, f64); 5] = [
+    (&[(0, 1, 0.25)], 0.25),
+    (&[(0, 1, 0.75)], 0.75),
+    (&[(0, 1, 0.5), (0, 2, 0.5)], 0.25),
+    (&[(0, 1, 0.5), (2, 0, 0.5)], 0.25),
+    (&[(0, 1, 0.125), (2, 1, 0.25), (2, 3, 0.5)], 0.125 * 0.875 + 0.125),
 ];
 
 /// Points of a sequence share out the parts of a mix, whatever the view and however mixes nest: the first 64 of a
@@ -81,9 +51,9 @@ const MIXES: [(Build, f64); 5] = [
 /// most five intervals of numbers, which end between points.
 #[test]
 fn mixes_have_their_shares_in_every_view() {
-    for (mix, (fill, green)) in MIXES.into_iter().enumerate() {
-        for (view, scene) in views(fill).into_iter().enumerate() {
-            let mut source = Ptwne::new(scene, 16, 16, RenderOptions::default()).unwrap();
+    for (mix, (mixes, green)) in MIXES.into_iter().enumerate() {
+        for (view, scene) in views(mixes).into_iter().enumerate() {
+            let mut source = source(scene, 16);
             let tolerance = if mix < 4 { 1e-6 } else { 5.0 / 64.0 };
             for pixel in batch(&mut source, 0, 64) {
                 let off = [f64::from(pixel[0]) - (1.0 - green), f64::from(pixel[1]) - green];
@@ -95,13 +65,11 @@ fn mixes_have_their_shares_in_every_view() {
 
 #[test]
 fn independent_samples_and_the_reference_mix_alike() {
-    for (fill, green) in MIXES {
-        for scene in views(fill) {
+    for (mixes, green) in MIXES {
+        for scene in views(mixes) {
             let options = RenderOptions { sampling: Sampling::Independent, ..RenderOptions::default() };
             agrees(mean(scene.clone(), 16, 64, 16, 1, options), green, 1e-6);
-            let mut source = Ptwne::new(scene, 8, 8, RenderOptions::default()).unwrap();
-            let picture = source.reference().unwrap().pixels;
-            let mean = picture.iter().map(|p| f64::from(p[1])).sum::<f64>() / picture.len() as f64;
+            let mean = reference(scene, 8, 1);
             assert!((mean - green).abs() < 0.02, "{mean}, expected {green}");
         }
     }
@@ -123,7 +91,7 @@ fn opacity_has_its_share_in_every_pixel() {
             b.environment(Environment::constant([1.0; 3])).unwrap();
         })
     };
-    let pixels = |scene| batch(&mut Ptwne::new(scene, 16, 16, RenderOptions::default()).unwrap(), 0, 64);
+    let pixels = |scene| batch(&mut source(scene, 16), 0, 64);
     assert!(pixels(sheets(&[0.25])).iter().all(|p| p[0] == 0.75));
     let two = pixels(sheets(&[0.5, 0.5]));
     assert!(two.iter().all(|p| (0.03..0.47).contains(&p[0])));

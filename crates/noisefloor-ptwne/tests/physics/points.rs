@@ -1,6 +1,6 @@
 use crate::direct::{check, lit};
-use crate::kit::batch;
-use noisefloor_ptwne::{Falloff, ImageTexture, Pixels, Profile, Ptwne, Punctual, RenderOptions, Texture};
+use crate::kit::{batch, source};
+use noisefloor_ptwne::{Falloff, ImageTexture, Pixels, Profile, Punctual, Texture};
 
 /// Spots that fade in other ways, and projectors, whose picture is red on the side of u.
 #[test]
@@ -36,7 +36,7 @@ fn spots_and_projectors_keep_their_profiles() {
     ] {
         let projector = Punctual::Projector { position, axes, extent, intensity, profile };
         let scene = lit(|b, _| b.projector(projector, picture.clone()).unwrap());
-        let mut source = Ptwne::new(scene.clone(), 4, 4, RenderOptions::default()).unwrap();
+        let mut source = source(scene.clone(), 4);
         let pixels = batch(&mut source, 0, 16);
         assert!(pixels.iter().all(|p| p[1] == 0.0 && p[2] == 0.0), "{pixels:?}");
         if expected == 0.0 {

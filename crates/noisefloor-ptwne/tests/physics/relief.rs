@@ -1,14 +1,12 @@
 //! Normal maps, bumps, coats and colours of corners, in closed form.
 
-use crate::kit::{agrees, batch, look, mean, scene};
+use crate::kit::{UP, agrees, batch, look, mean, scene};
 use noisefloor::Rgb;
 use noisefloor_ptwne::{
     Camera, Emission, Environment, ImageTexture, Material, MaterialOptions, Mesh, Pixels, Ptwne, Punctual,
     Relief, RenderOptions, Scene, SceneBuilder, Texture, Wrap,
 };
 use std::f32::consts::PI;
-
-const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
 fn with(relief: Option<Relief>) -> MaterialOptions {
     MaterialOptions { relief, ..MaterialOptions::default() }

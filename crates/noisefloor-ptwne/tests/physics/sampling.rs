@@ -1,5 +1,6 @@
 //! What sessions rely on: noise that is white over the pixels, and halves that show it.
 
+use crate::kit::mean_of;
 use noisefloor::{ProgressiveSource, Request, Rgb, Tile, source::Sequence};
 use noisefloor_ptwne::{Ptwne, RenderOptions, Sampling, scenes};
 use std::sync::Arc;
@@ -49,10 +50,8 @@ fn statistics(scene: &str, sampling: Sampling, b: u32) -> (f64, f64) {
         noise.push((means[0] - mean) / variance.sqrt().max(1e-9));
     }
     let z = |values: &[f64]| {
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        mean / (variance / n).sqrt()
+        let (mean, error) = mean_of(values);
+        mean / error
     };
     let neighbours: Vec<f64> =
         (0..noise.len()).filter(|i| i % EDGE > 0).map(|i| noise[i] * noise[i - 1]).collect();

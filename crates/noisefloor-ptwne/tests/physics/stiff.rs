@@ -1,12 +1,10 @@
 //! The stiff scenes, against mathematically known answers.
 
-use crate::kit::{agrees, batch, look, mean, scene};
+use crate::kit::{UP, agrees, batch, look, mean, mean_of, scene, source};
 use noisefloor::Rgb;
 use noisefloor_ptwne::{
     Camera, Emission, Environment, Estimator, Material, Mesh, Ptwne, Punctual, RenderOptions, Scene, scenes,
 };
-
-const UP: [f32; 3] = [0.0, 1.0, 0.0];
 
 /// A black shell in surroundings of radiance 1, seen from inside: any light leaked through a crack.
 fn leaks(positions: &[[f32; 3]], indices: &[[u32; 3]], eye: [f32; 3]) -> f64 {
@@ -63,7 +61,7 @@ fn stiff(name: &str, camera: Option<Camera>) -> Scene {
 #[test]
 fn without_light_or_reflection_there_is_nothing() {
     for name in ["black", "unlit"] {
-        let mut source = Ptwne::new(stiff(name, None), 32, 32, RenderOptions::default()).unwrap();
+        let mut source = source(stiff(name, None), 32);
         assert!(batch(&mut source, 0, 16).iter().all(|p| *p == [0.0; 3]));
         assert!(source.reference().unwrap().pixels.iter().all(|p| *p == [0.0; 3]));
     }
@@ -80,7 +78,7 @@ fn a_pinpoint_lights_as_a_point() {
         let options = RenderOptions { estimator, max_depth: 2, ..RenderOptions::default() };
         agrees(mean(stiff("pinpoint", Some(camera)), 4, 64, 20, 0, options), expected, 1e-3);
     }
-    let mut source = Ptwne::new(stiff("pinpoint", Some(camera)), 4, 4, RenderOptions::default()).unwrap();
+    let mut source = source(stiff("pinpoint", Some(camera)), 4);
     let reference = f64::from(source.reference().unwrap().pixels[5][0]);
     assert!((reference - expected).abs() < 1e-3 * expected, "{reference} {expected}");
 }
@@ -139,9 +137,7 @@ fn decades(estimator: Estimator, samples: u64) -> Vec<(f64, f64)> {
             .iter()
             .map(|b| wall.iter().map(|p| f64::from(b[*p][0]) / radiance).sum::<f64>() / wall.len() as f64)
             .collect();
-        let mean = means.iter().sum::<f64>() / 64.0;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 63.0;
-        (mean, (variance / 64.0).sqrt())
+        mean_of(&means)
     };
     (0..9).map(niche).collect()
 }
@@ -174,7 +170,7 @@ fn far_away_is_as_near() {
         })
     };
     let render = |scene| {
-        let mut source = Ptwne::new(scene, 32, 32, RenderOptions::default()).unwrap();
+        let mut source = source(scene, 32);
         (batch(&mut source, 0, 8), source.reference().unwrap().pixels)
     };
     let (here, there) = ([0.0; 3], [998_000.0, -999_000.0, 997_000.0]);
