@@ -18,7 +18,7 @@ use noisefloor_image::StackSource;
 use noisefloor_ptwne::{
     Estimator, Filter, Ptwne, ReferenceNoise, RenderOptions, SampleCounts, Sampling, scenes,
 };
-use noisefloor_scenefile::{LoadError, LoadOptions, Loaded, group_warnings};
+use noisefloor_scenefile::{LoadFault, LoadOptions, Loaded, group_warnings};
 use noisefloor_sidecar::{AdaptivePicture, Device};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
@@ -404,9 +404,9 @@ fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
              {meant}`noisefloor scenes` lists the scenes"
         );
     }
-    noisefloor_scenefile::load_with(path, options).map_err(|error| match (&error, elsewhere(path)) {
-        (LoadError::Format { .. }, Some(advice)) => Usage(format!("{}: {advice}", path.display())).into(),
-        (LoadError::LeftOut { .. }, _) => Usage(error.to_string()).into(),
+    noisefloor_scenefile::load_with(path, options).map_err(|error| match (&error.fault, elsewhere(path)) {
+        (LoadFault::Format, Some(advice)) => Usage(format!("{}: {advice}", path.display())).into(),
+        (LoadFault::LeftOut, _) => Usage(error.to_string()).into(),
         _ => error.into(),
     })
 }

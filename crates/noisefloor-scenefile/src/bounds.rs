@@ -42,9 +42,9 @@ impl Bounds {
     ) -> Result<(), LoadError> {
         let mut open = self.open.borrow_mut();
         if open.contains(&key) {
-            return Err(place.clone().bad(format_args!("{called} refers to itself")));
+            return Err(place.bad(format_args!("{called} refers to itself")));
         }
-        place.clone().at_most("nested surfaces and textures", open.len() as u64 + 1, MAX_NESTED)?;
+        place.at_most("nested surfaces and textures", open.len() as u64 + 1, MAX_NESTED)?;
         open.push(key);
         Ok(())
     }
@@ -71,13 +71,14 @@ impl Bounds {
 
     pub(crate) fn spend(&self, work: usize, place: &Place) -> Result<(), LoadError> {
         self.spent.set(self.spent.get().saturating_add(work as u64));
-        place.clone().at_most("steps of reading the scene so far", self.spent.get(), MAX_WORK)
+        place.at_most("steps of reading the scene so far", self.spent.get(), MAX_WORK)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::LoadFault;
     use std::path::Path;
 
     #[test]
@@ -95,7 +96,10 @@ mod tests {
         bounds.end();
         bounds.begin(99, "<a>", &place).unwrap();
         bounds.spend(1 << 31, &place).unwrap();
-        assert!(matches!(bounds.spend(usize::MAX, &place), Err(LoadError::TooLarge { .. })));
+        assert!(matches!(
+            bounds.spend(usize::MAX, &place),
+            Err(LoadError { fault: LoadFault::TooLarge { .. }, .. })
+        ));
 
         // Any number of equal coats, but not of different ones
         let bounds = Bounds::default();
@@ -106,6 +110,6 @@ mod tests {
         };
         (0..10_000).try_for_each(|_| coat(0.5)).unwrap();
         let error = (0..10_000).try_for_each(|i| coat(i as f32 * 1e-4));
-        assert!(matches!(error, Err(LoadError::TooLarge { .. })));
+        assert!(matches!(error, Err(LoadError { fault: LoadFault::TooLarge { .. }, .. })));
     }
 }

@@ -85,17 +85,6 @@ pub(crate) fn combined<const N: usize>(
     (Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..first.clone() }), replaced)
 }
 
-/// The same of grey ones.
-pub(crate) fn joined<const N: usize>(
-    parts: [&Texture; N],
-    mean: impl Fn(&Texture) -> Rgb,
-    put: impl Fn([f32; N]) -> Rgb,
-) -> (Texture, bool) {
-    let grey = |p: Rgb| (p[0] + p[1] + p[2]) / 3.0;
-    let inside = |colour: Rgb| colour.map(|c| c.clamp(0.0, 1.0));
-    combined(parts, mean, |colours| inside(put(colours.map(grey))))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,13 +103,15 @@ mod tests {
             let pixels = Pixels::Linear8(codes.iter().map(|c| [*c; 3]).collect());
             Texture::Image(ImageTexture::new(codes.len(), 1, pixels))
         };
-        let put = |[a, b]: [f32; 2]| [a * a, b, 2.0];
+        let put = |[a, b]: [Rgb; 2]| [a[0] * a[0], b[0], 2.0];
         let (two, other) = (image(&[0, 255]), image(&[0, 0, 255]));
-        let (Texture::Image(found), false) = joined([&two, &image(&[51, 102])], mean, put) else { panic!() };
+        let (Texture::Image(found), false) = combined([&two, &image(&[51, 102])], mean, put) else {
+            panic!()
+        };
         assert_eq!(found.pixels, Pixels::Float([[0.0, 0.2, 1.0], [1.0, 0.4, 1.0]].into()));
-        let (Texture::Image(found), true) = joined([&two, &other], mean, put) else { panic!() };
+        let (Texture::Image(found), true) = combined([&two, &other], mean, put) else { panic!() };
         assert_eq!(linear(&found.pixels)[1], [1.0, 1.0 / 3.0, 1.0]);
-        let plain = joined([&Texture::Colour([0.5; 3]), &Texture::Colour([0.25; 3])], mean, put);
-        assert_eq!(plain, (Texture::Colour([0.25, 0.25, 1.0]), false));
+        let plain = combined([&Texture::Colour([0.5; 3]), &Texture::Colour([0.25; 3])], mean, put);
+        assert_eq!(plain, (Texture::Colour([0.25, 0.25, 2.0]), false));
     }
 }

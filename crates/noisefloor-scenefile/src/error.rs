@@ -22,6 +22,33 @@ impl Place {
     pub(crate) fn part(path: &Path, part: impl fmt::Display) -> Self {
         Self { path: path.to_owned(), part: Some(part.to_string()) }
     }
+
+    pub(crate) fn line(path: &Path, line: impl fmt::Display) -> Self {
+        Self::part(path, format_args!("line {line}"))
+    }
+
+    pub(crate) fn error(&self, fault: LoadFault) -> LoadError {
+        LoadError { place: self.clone(), fault }
+    }
+
+    pub(crate) fn bad(&self, what: impl fmt::Display) -> LoadError {
+        self.error(LoadFault::Bad(what.to_string()))
+    }
+
+    pub(crate) fn unsupported(&self, what: impl fmt::Display) -> LoadError {
+        self.error(LoadFault::Unsupported(what.to_string()))
+    }
+
+    /// The error that the renderer does not take what is here.
+    pub(crate) fn refused(&self) -> impl Fn(SceneError) -> LoadError + use<> {
+        let place = self.clone();
+        move |cause| place.error(cause.into())
+    }
+
+    /// [`LoadFault::TooLarge`] here, if `found` is above `limit`.
+    pub(crate) fn at_most(&self, what: &'static str, found: u64, limit: u64) -> Result<(), LoadError> {
+        if found > limit { Err(self.error(LoadFault::TooLarge { what, found, limit })) } else { Ok(()) }
+    }
 }
 
 impl fmt::Display for Place {
@@ -30,21 +57,6 @@ impl fmt::Display for Place {
             Some(part) => write!(f, "{}: {part}", self.path.display()),
             None => write!(f, "{}", self.path.display()),
         }
-    }
-}
-
-impl Place {
-    pub(crate) fn bad(self, what: impl fmt::Display) -> LoadError {
-        LoadError::Bad { place: self, what: what.to_string() }
-    }
-
-    pub(crate) fn unsupported(self, what: impl fmt::Display) -> LoadError {
-        LoadError::Unsupported { place: self, what: what.to_string() }
-    }
-
-    /// [`LoadError::TooLarge`] here, if `found` is above `limit`.
-    pub(crate) fn at_most(self, what: &'static str, found: u64, limit: u64) -> Result<(), LoadError> {
-        if found > limit { Err(LoadError::TooLarge { place: self, what, found, limit }) } else { Ok(()) }
     }
 }
 
@@ -124,10 +136,10 @@ impl fmt::Display for Finding {
 
 /// Groups warnings that say the same: most important first, then in the order in which they came up.
 pub fn group_warnings(warnings: &[Warning]) -> Vec<Finding> {
-    group(warnings.iter().map(|w| (w.treatment, w.what.clone(), Some(w.place.clone()))))
+    group(warnings.iter().map(|w| (w.treatment, w.what.clone(), &w.place)))
 }
 
-fn group(all: impl Iterator<Item = (Treatment, String, Option<Place>)>) -> Vec<Finding> {
+fn group<'a>(all: impl Iterator<Item = (Treatment, String, &'a Place)>) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
     let mut known: HashMap<(Treatment, String), usize> = HashMap::new();
     for (treatment, what, place) in all {
@@ -135,101 +147,82 @@ fn group(all: impl Iterator<Item = (Treatment, String, Option<Place>)>) -> Vec<F
             findings.push(Finding { treatment, what, places: vec![] });
             findings.len() - 1
         });
-        findings[index].places.extend(place);
+        findings[index].places.push(place.clone());
     }
     findings.sort_by_key(|finding| finding.treatment);
     findings
 }
 
 /// Why a scene file cannot be loaded.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct LoadError {
+    /// Where it is wrong; of several errors, the first.
+    pub place: Place,
+    pub fault: LoadFault,
+}
+
+/// What is wrong there.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum LoadError {
-    #[error("{} is not a scene file: its name must end in .gltf, .glb, .pbrt or .xml", path.display())]
-    Format { path: PathBuf },
-    #[error("{}: this build reads no scene files: run `cargo run --release --features formats -- render …`", path.display())]
-    LeftOut { path: PathBuf },
-    #[error("{place} cannot be read")]
-    Read {
-        /// The file, or where it is named.
-        place: Place,
-        #[source]
-        cause: std::io::Error,
-    },
-    /// A file is not what it should be.
-    #[error("{place}: {what}")]
-    Bad {
-        place: Place,
-        /// What is wrong, and what is expected.
-        what: String,
-    },
-    #[error("{place}: {what} is not supported")]
-    Unsupported { place: Place, what: String },
-    #[error("{place}: `{name}` lies outside the folder of the scene; allow a folder by `--scene-root DIR`")]
-    Outside { place: Place, name: String },
-    #[error("{place}: {found} {what}, more than {limit}")]
+pub enum LoadFault {
+    #[error("it is no scene file: its name must end in .gltf, .glb, .pbrt or .xml")]
+    Format,
+    #[error("this build reads no scene files: run `cargo run --release --features formats -- render …`")]
+    LeftOut,
+    #[error("cannot be read: {0}")]
+    Read(std::io::Error),
+    /// Something is not what it should be.
+    #[error("{0}")]
+    Bad(String),
+    #[error("{0} is not supported")]
+    Unsupported(String),
+    #[error("`{0}` lies outside the folder of the scene; allow a folder by `--scene-root DIR`")]
+    Outside(String),
+    #[error("{found} {what}, more than {limit}")]
     TooLarge {
-        place: Place,
         /// What there is too much of.
         what: &'static str,
         found: u64,
         limit: u64,
     },
-    #[error("{place}")]
-    Scene {
-        place: Place,
-        #[source]
-        cause: SceneError,
-    },
-    #[error("{}", several(.0))]
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error("{} errors", .0.len())]
     Several(Vec<LoadError>),
 }
 
 impl LoadError {
     /// All that is wrong: errors that say the same are one finding.
     pub fn findings(&self) -> Vec<Finding> {
-        match self {
-            Self::Several(errors) => group(errors.iter().map(LoadError::finding)),
-            one => group(std::iter::once(one.finding())),
-        }
-    }
-
-    fn finding(&self) -> (Treatment, String, Option<Place>) {
-        let (place, what) = match self {
-            Self::Format { .. } | Self::LeftOut { .. } | Self::Several(_) => (None, self.to_string()),
-            Self::Bad { place, what } => (Some(place), what.clone()),
-            Self::Unsupported { place, what } => (Some(place), format!("{what} is not supported")),
-            Self::Outside { place, name } => {
-                let what = "lies outside the folder of the scene; allow a folder by `--scene-root DIR`";
-                (Some(place), format!("`{name}` {what}"))
-            }
-            Self::TooLarge { place, what, found, limit } => {
-                (Some(place), format!("{found} {what}, more than {limit}"))
-            }
-            Self::Read { place, cause } => (Some(place), format!("cannot be read: {cause}")),
-            Self::Scene { place, cause } => (Some(place), with_causes(cause)),
+        let all = match &self.fault {
+            LoadFault::Several(errors) => errors.as_slice(),
+            _ => std::slice::from_ref(self),
         };
-        (Treatment::Refused, what, place.cloned())
+        group(all.iter().map(|error| (Treatment::Refused, error.what(), &error.place)))
+    }
+
+    /// What is wrong, with its causes.
+    fn what(&self) -> String {
+        let mut message = self.fault.to_string();
+        let mut cause = self.fault.source();
+        while let Some(error) = cause {
+            message += &format!(": {error}");
+            cause = error.source();
+        }
+        message
     }
 }
 
-/// The message of an error and those of its causes.
-fn with_causes(error: &dyn Error) -> String {
-    let mut message = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        message += &format!(": {error}");
-        cause = error.source();
+/// A line for each finding.
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lines: Vec<String> = self.findings().iter().map(ToString::to_string).collect();
+        f.write_str(&lines.join("\n"))
     }
-    message
 }
 
-/// A line for each group of errors.
-fn several(errors: &[LoadError]) -> String {
-    let findings = group(errors.iter().map(LoadError::finding));
-    let lines: Vec<String> = findings.iter().map(ToString::to_string).collect();
-    lines.join("\n")
-}
+impl Error for LoadError {}
 
 /// Collects errors, so that one load says all that is wrong.
 #[derive(Debug, Default)]
@@ -246,9 +239,10 @@ impl Errors {
         match result {
             Ok(value) => Ok(Some(value)),
             Err(error) => {
-                let stop = matches!(error, LoadError::TooLarge { .. }) || self.errors.len() >= MAX_ERRORS;
+                let large = matches!(error.fault, LoadFault::TooLarge { .. });
+                let stop = large || self.errors.len() >= MAX_ERRORS;
                 // Many shapes can wear one broken material
-                if self.seen.insert(with_causes(&error)) {
+                if self.seen.insert(error.to_string()) {
                     self.errors.push(error);
                 }
                 if stop { Err(std::mem::take(self).into_error()) } else { Ok(None) }
@@ -261,6 +255,9 @@ impl Errors {
     }
 
     fn into_error(mut self) -> LoadError {
-        if self.errors.len() == 1 { self.errors.remove(0) } else { LoadError::Several(self.errors) }
+        match self.errors.len() {
+            1 => self.errors.remove(0),
+            _ => self.errors[0].place.clone().error(LoadFault::Several(self.errors)),
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Files that a scene file names, how much of them is read, and what was in them.
 
-use crate::error::{LoadError, Place};
+use crate::error::{LoadError, LoadFault, Place};
 use noisefloor::source::SourceIdentity;
 use noisefloor::text::stand_in;
 pub(crate) use noisefloor::text::{lines, text};
@@ -84,7 +84,7 @@ impl Folder {
 
     /// Adds a folder, relative to the scene's own, in which to look for files.
     pub(crate) fn search(&mut self, name: &str, place: &Place) -> Result<(), LoadError> {
-        place.clone().at_most("search paths", self.searched.len() as u64, MAX_FOLDERS)?;
+        place.at_most("search paths", self.searched.len() as u64, MAX_FOLDERS)?;
         let path = self.find(name, place)?;
         self.searched.push(path);
         Ok(())
@@ -95,11 +95,11 @@ impl Folder {
     /// count.
     ///
     /// # Errors
-    /// [`LoadError::Outside`] if the name, or a link on the way, leads out of the root; [`LoadError::Read`]
+    /// [`LoadFault::Outside`] if the name, or a link on the way, leads out of the root; [`LoadFault::Read`]
     /// if there is no such file.
     pub(crate) fn find(&self, name: &str, place: &Place) -> Result<PathBuf, LoadError> {
-        let outside = || LoadError::Outside { place: place.clone(), name: name.to_owned() };
-        let failed = |cause| LoadError::Read { place: place.clone(), cause };
+        let outside = || place.error(LoadFault::Outside(name.to_owned()));
+        let failed = |cause| place.error(LoadFault::Read(cause));
         let name = name.replace('\\', "/");
         let bare = Some(name.trim()).filter(|bare| *bare != name);
         let names = [Some(name.as_str()), bare].into_iter().flatten().map(Path::new);
@@ -134,7 +134,7 @@ impl Folder {
     pub(crate) fn read(&self, path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
         let bytes = read(path, limit, place)?;
         self.bytes.set(self.bytes.get().saturating_add(bytes.len() as u64));
-        place.clone().at_most("bytes of files so far", self.bytes.get(), MAX_BYTES)?;
+        place.at_most("bytes of files so far", self.bytes.get(), MAX_BYTES)?;
         if self.distinct.borrow_mut().insert(path.to_owned()) {
             self.distinct_bytes.set(self.distinct_bytes.get() + bytes.len() as u64);
         }
@@ -150,7 +150,7 @@ impl Folder {
     /// Counts bytes that compressed data becomes, before it does.
     pub(crate) fn inflate(&self, bytes: u64, place: &Place) -> Result<(), LoadError> {
         self.inflated.set(self.inflated.get().saturating_add(bytes));
-        place.clone().at_most("inflated bytes so far", self.inflated.get(), self.most_inflated())
+        place.at_most("inflated bytes so far", self.inflated.get(), self.most_inflated())
     }
 
     /// How many bytes compressed data may still become.
@@ -166,7 +166,7 @@ impl Folder {
     pub(crate) fn draw(&self, pixels: u64, place: &Place) -> Result<(), LoadError> {
         self.pixels.set(self.pixels.get().saturating_add(pixels));
         let most = self.distinct_bytes.get().saturating_mul(PIXELS_A_BYTE).saturating_add(FREE_PIXELS);
-        place.clone().at_most("pixels of pictures so far", self.pixels.get(), most)
+        place.at_most("pixels of pictures so far", self.pixels.get(), most)
     }
 
     /// Counts surfaces, before or after they are made.
@@ -175,7 +175,7 @@ impl Folder {
     /// As [`Self::inflate`].
     pub(crate) fn build(&self, surfaces: u64, place: &Place) -> Result<(), LoadError> {
         self.surfaces.set(self.surfaces.get().saturating_add(surfaces));
-        place.clone().at_most("surfaces so far", self.surfaces.get(), self.most_surfaces())
+        place.at_most("surfaces so far", self.surfaces.get(), self.most_surfaces())
     }
 
     /// How many more surfaces there may be.
@@ -244,7 +244,7 @@ fn is_private_to_a_collection(folder: &Path, home: Option<&Path>) -> bool {
 /// Checks that there is memory for what so many bytes become.
 pub(crate) fn has_memory(bytes: u64, each: u64, place: &Place) -> Result<(), LoadError> {
     let bytes = usize::try_from(bytes.saturating_mul(each)).unwrap_or(usize::MAX);
-    check_memory(bytes).map_err(|cause| LoadError::Scene { place: place.clone(), cause })
+    check_memory(bytes).map_err(place.refused())
 }
 
 /// Reads a regular file.
@@ -255,7 +255,7 @@ fn read(path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
             true => cause,
             false => io::Error::new(cause.kind(), format!("`{}`: {cause}", path.display())),
         };
-        LoadError::Read { place: place.clone(), cause }
+        place.error(LoadFault::Read(cause))
     };
 
     // A pipe or a device would block or never end
@@ -309,7 +309,7 @@ mod tests {
         let find = |name: &str| folder.find(name, &Place::file(Path::new("scene.xml")));
         assert!(find("../near").is_ok() && find("../../shared").is_ok());
         let error = find("../../../secret").unwrap_err();
-        assert!(matches!(error, LoadError::Outside { .. }) && error.to_string().contains("--scene-root"));
+        assert!(matches!(error.fault, LoadFault::Outside(_)) && error.to_string().contains("--scene-root"));
         // Asked for, it is strict
         let folder = Folder::of(&scene.join("scene.xml"), Some(&scene), String::new());
         assert!(folder.find("../near", &Place::file(Path::new("scene.xml"))).is_err());

@@ -14,7 +14,6 @@ mod loader;
 mod material;
 mod mesh;
 mod nodes;
-mod notes;
 mod parts;
 mod properties;
 mod rest;
@@ -22,8 +21,9 @@ mod shared;
 mod texture;
 mod uri;
 
-use crate::files::{Folder, has_memory};
-use crate::loaded::{Loaded, title};
+use crate::files::has_memory;
+use crate::load::Load;
+use crate::loaded::{Loaded, anywhere, title};
 use crate::{LoadError, Place};
 use asset::{Asset, MAX_BYTES};
 use glam::DVec3;
@@ -33,7 +33,6 @@ use loader::Loader;
 use material::Materials;
 use nodes::Placed;
 use noisefloor_ptwne::{MAX_SURFACES, SceneBuilder};
-use notes::Notes;
 use parts::name;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -44,31 +43,31 @@ const MAX_PRIMITIVES: u64 = 1 << 20;
 const BYTES_EACH: u64 = 64;
 
 pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError> {
-    let folder = Folder::of(path, root, String::new());
-    let file = folder.read(path, MAX_BYTES, &Place::file(path))?;
-    let asset = Asset::parse(path, &folder, &file)?;
-    notes::check_required(&asset)?;
+    let load = Load::new(path, root, String::new());
+    let file = load.folder.read(path, MAX_BYTES, &Place::file(path))?;
+    let asset = Asset::parse(&load, &file)?;
+    asset.check_required()?;
     let asset = draco::inflated(asset)?;
     let placed = nodes::placed(&asset)?;
     let sharing = shared::sharing(&placed);
     check_size(&asset, &placed, &sharing)?;
 
-    let mut notes = Notes::default();
     let whole = Place::file(path);
-    let (camera, optics) = camera::first(&asset, &placed, &mut notes)?.unzip();
+    let (camera, optics) = camera::first(&asset, &placed)?.unzip();
     if camera.is_none() {
-        notes.warn(&whole, "it has no camera: all of it is seen from the front, above and to the right");
+        asset
+            .load
+            .ignored(&whole, "it has no camera: all of it is seen from the front, above and to the right");
     }
     let title = title(path);
-    let refused = |cause| LoadError::Scene { place: whole.clone(), cause };
-    let mut builder = SceneBuilder::new(title, camera.unwrap_or_else(camera::anywhere)).map_err(refused)?;
-    builder.optics(optics.unwrap_or_default()).map_err(refused)?;
+    let refused = whole.refused();
+    let mut builder = SceneBuilder::new(title, camera.unwrap_or_else(anywhere)).map_err(&refused)?;
+    builder.optics(optics.unwrap_or_default()).map_err(&refused)?;
 
     let mut loader = Loader {
         asset: &asset,
         builder,
         materials: Materials::new(&asset),
-        notes,
         meshes: HashSet::new(),
         nodes: rest::by_index(&placed),
         skins: HashMap::new(),
@@ -85,34 +84,36 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
         Some(camera) => camera,
         None => loader.framing()?,
     };
-    let Loader { builder, mut notes, needs_light, .. } = loader;
+    let Loader { builder, needs_light, .. } = loader;
     for (index, animation) in asset.root.animations.iter().enumerate() {
         let place = Place::part(path, name("animation", index, animation.name.as_deref()));
-        notes.warn(&place, "it is ignored: everything stays at rest, where its node is");
+        asset.load.ignored(&place, "it is ignored: everything stays at rest, where its node is");
     }
-    let mut scene = builder.build().and_then(|scene| scene.with_camera(camera)).map_err(refused)?;
+    let mut scene = builder.build().and_then(|scene| scene.with_camera(camera)).map_err(&refused)?;
     if needs_light {
         const DAYLIGHT: &str = "it gets a grey sky, and a sun over the viewer's left shoulder";
         let sky = match scene.lights() {
             0 => {
-                notes.warn(&whole, format_args!("it has no light: {DAYLIGHT}"));
+                asset.load.ignored(&whole, format_args!("it has no light: {DAYLIGHT}"));
                 Some(light::daylight(&camera))
             }
             _ => {
                 let sky = light::missing_daylight(&scene, &camera);
                 if sky.is_some() {
                     let what = format_args!("its own lights show next to nothing of it: {DAYLIGHT}");
-                    notes.warn(&whole, what);
+                    asset.load.ignored(&whole, what);
                 }
                 sky
             }
         };
         if let Some(sky) = sky {
-            scene = scene.with_environment(sky).map_err(refused)?;
+            scene = scene.with_environment(sky).map_err(&refused)?;
         }
     }
-    let scene = scene.with_identity(folder.contents());
-    Ok(Loaded { scene, size: None, max_depth: None, clamp: None, warnings: notes.finish(&asset) })
+    asset.say_unread();
+    let scene = scene.with_identity(load.folder.contents());
+    drop(asset);
+    Ok(Loaded { scene, size: None, max_depth: None, clamp: None, warnings: load.into_warnings() })
 }
 
 /// Checks what the scene would come to, by the counts that its accessors have: a small file can show a mesh
@@ -142,9 +143,9 @@ fn check_size(asset: &Asset<'_>, placed: &[Placed<'_>], sharing: &HashSet<usize>
             vertices = vertices.saturating_add(corners.saturating_mul(shapes));
             let own = mesh::count(mesh::mode(primitive, &place)?, indices);
             triangles = triangles.saturating_add(own);
-            place.clone().at_most("primitives of nodes up to here", primitives, MAX_PRIMITIVES)?;
-            place.clone().at_most("vertices up to here", vertices, 3 * MAX_SURFACES as u64)?;
-            asset.folder().build(own, &place)?;
+            place.at_most("primitives of nodes up to here", primitives, MAX_PRIMITIVES)?;
+            place.at_most("vertices up to here", vertices, 3 * MAX_SURFACES as u64)?;
+            asset.load.folder.build(own, &place)?;
         }
     }
     has_memory(vertices + triangles, BYTES_EACH, &Place::file(asset.path))

@@ -22,6 +22,8 @@ mod files;
 mod gltf;
 #[cfg(feature = "formats")]
 mod indices;
+#[cfg(feature = "formats")]
+mod load;
 mod loaded;
 #[cfg(feature = "formats")]
 mod mesh;
@@ -35,7 +37,7 @@ mod picture;
 #[cfg(feature = "formats")]
 mod sky;
 
-pub use error::{Finding, LoadError, Place, Treatment, Warning, group_warnings};
+pub use error::{Finding, LoadError, LoadFault, Place, Treatment, Warning, group_warnings};
 pub use loaded::Loaded;
 pub use options::LoadOptions;
 
@@ -54,7 +56,7 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
 pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if !matches!(extension.as_str(), "gltf" | "glb" | "vrm" | "pbrt" | "xml") {
-        return Err(LoadError::Format { path: path.to_owned() });
+        return Err(Place::file(path).error(LoadFault::Format));
     }
     let mut loaded = read(path, &extension, options)?;
     if !loaded.scene.is_lit() {
@@ -74,7 +76,7 @@ fn read(path: &Path, extension: &str, options: &LoadOptions) -> Result<Loaded, L
 
 #[cfg(not(feature = "formats"))]
 fn read(path: &Path, _: &str, _: &LoadOptions) -> Result<Loaded, LoadError> {
-    Err(LoadError::LeftOut { path: path.to_owned() })
+    Err(Place::file(path).error(LoadFault::LeftOut))
 }
 
 #[cfg(doctest)]

@@ -36,14 +36,12 @@ impl Triangles {
         if let Some(face) = self.indices.iter().position(|t| t.iter().any(|i| *i as usize >= count)) {
             let triangle = self.indices[face];
             let what = format!("face {face} has corners {triangle:?}, but there are {count} vertices");
-            return Err(place.clone().bad(what));
+            return Err(place.bad(what));
         }
         let numbers = self.normals.as_flattened_mut().iter_mut().chain(self.uvs.as_flattened_mut());
         numbers.filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
         match self.positions.iter().position(|row| row.iter().any(|x| !x.is_finite())) {
-            Some(vertex) => {
-                Err(place.clone().bad(format!("vertex {vertex} has a number that is not finite")))
-            }
+            Some(vertex) => Err(place.bad(format!("vertex {vertex} has a number that is not finite"))),
             None => Ok(()),
         }
     }
@@ -63,7 +61,7 @@ impl Triangles {
             *position =
                 to_world.transform_point3(Vec3::from_array(*position).as_dvec3()).as_vec3().to_array();
         }
-        let matrix = normal_matrix(to_world);
+        let matrix = normal_matrix(DMat3::from_mat4(to_world));
         for normal in &mut self.normals {
             let moved = matrix * Vec3::from_array(*normal).as_dvec3();
             *normal = moved.normalize_or_zero().as_vec3().to_array();
@@ -226,11 +224,11 @@ pub(crate) fn rows(to_world: DMat4) -> [[f64; 4]; 3] {
     [0, 1, 2].map(|i| to_world.row(i).to_array())
 }
 
-/// The matrix that takes normals along: the inverse transpose of the upper left 3×3, but for a positive
+/// The matrix that takes normals along: the inverse transpose, but for a positive
 /// factor. Computed from cofactors, so that singular transforms work.
-pub(crate) fn normal_matrix(to_world: DMat4) -> DMat3 {
-    let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
-    let sign = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };
+pub(crate) fn normal_matrix(to_world: DMat3) -> DMat3 {
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = to_world;
+    let sign = if to_world.determinant() < 0.0 { -1.0 } else { 1.0 };
     let column = |a: DVec3, b: DVec3| a.cross(b) * sign;
     DMat3::from_cols(column(y, z), column(z, x), column(x, y))
 }

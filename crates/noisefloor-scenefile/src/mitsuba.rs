@@ -47,7 +47,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
     let hides_lights = integrator.map_or(Ok(false), |element| context.hides_emitters(element))?;
 
     // What is in it: without a camera, too, so that all errors are found
-    let View { camera, optics, size } = camera.unwrap_or_else(View::any);
+    let View { camera, optics, size } = camera.unwrap_or_default();
     let mut builder = SceneBuilder::new(title(path), camera).map_err(context.refused(sensor))?;
     builder.optics(Optics { hides_lights, ..optics }).map_err(context.refused(sensor))?;
     let mut filling = Filling::new(builder);
@@ -68,8 +68,7 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadErr
     errors.take(context.finish())?;
     errors.finish()?;
 
-    let scene =
-        filling.builder.build().map_err(|cause| LoadError::Scene { place: Place::file(path), cause })?;
-    let scene = scene.with_identity(document.folder.contents());
-    Ok(Loaded { scene, size, max_depth, clamp: None, warnings: context.into_warnings() })
+    let scene = filling.builder.build().map_err(Place::file(path).refused())?;
+    let scene = scene.with_identity(document.load.folder.contents());
+    Ok(Loaded { scene, size, max_depth, clamp: None, warnings: document.load.into_warnings() })
 }

@@ -9,8 +9,8 @@ use image::codecs::png::PngDecoder;
 use image::codecs::tga::TgaDecoder;
 use image::codecs::webp::WebPDecoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, Limits};
-use noisefloor::Rgb;
-use noisefloor_ptwne::MAX_TEXTURE_PIXELS;
+use noisefloor::{Rgb, display::srgb_decode};
+use noisefloor_ptwne::{MAX_TEXTURE_PIXELS, Pixels};
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -42,6 +42,26 @@ pub(crate) enum Samples {
     Linear(Vec<Rgb>),
 }
 
+impl Samples {
+    /// Their colours; codes are taken as they are if they are `raw`, for sRGB otherwise.
+    pub(crate) fn pixels(self, raw: bool) -> Pixels {
+        match self {
+            Self::Eight(codes) => {
+                let codes = codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
+                if raw { Pixels::Linear8(codes) } else { Pixels::Srgb8(codes) }
+            }
+            Self::Sixteen(codes) => {
+                let linear = |code: u16| {
+                    let value = f32::from(code) / 65535.0;
+                    if raw { value } else { srgb_decode(value) }
+                };
+                Pixels::Float(codes.iter().map(|[r, g, b, _]| [*r, *g, *b].map(linear)).collect())
+            }
+            Self::Linear(values) => Pixels::Float(values.into()),
+        }
+    }
+}
+
 /// Reads the EXR, PFM, Radiance, PNG, JPEG, WebP, BMP or TGA file in `path`, named at `place`. Its content says
 /// which it is, not its name, but for TGA, which has no mark.
 ///
@@ -59,7 +79,7 @@ pub(crate) fn read(folder: &Folder, path: &Path, place: &Place) -> Result<Pictur
             return decode_as(folder, &bytes, tga.then_some(ImageFormat::Tga), &here);
         }
     };
-    let image = linear.map_err(|e| here.clone().bad(e))?;
+    let image = linear.map_err(|e| here.bad(e))?;
     check_size(image.width as u64, image.height as u64, &here)?;
     folder.draw((image.width * image.height) as u64, &here)?;
     Ok(Picture { width: image.width, height: image.height, samples: Samples::Linear(image.pixels) })
@@ -77,7 +97,7 @@ fn decode_as(
     format: Option<ImageFormat>,
     place: &Place,
 ) -> Result<Picture, LoadError> {
-    let broken = |e: image::ImageError| place.clone().bad(format!("the picture is broken: {e}"));
+    let broken = |e: image::ImageError| place.bad(format!("the picture is broken: {e}"));
     // A Radiance picture begins with `#?` and any word: RGBE, RADIANCE, rtrace. The decoder knows one
     let renamed = bytes.strip_prefix(b"#?").map(|rest| {
         let line = rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len());
@@ -107,10 +127,10 @@ fn decode_as(
                 [0xab, b'K', b'T', b'X', ..] => "a KTX2 picture (KHR_texture_basisu)",
                 _ => "a picture that is neither PNG, JPEG, WebP, BMP, TGA, PFM, OpenEXR nor Radiance",
             };
-            Err(place.clone().unsupported(what))
+            Err(place.unsupported(what))
         }
     }));
-    decoded.unwrap_or_else(|_| Err(place.clone().bad("the picture is broken: its decoder gave up")))
+    decoded.unwrap_or_else(|_| Err(place.bad("the picture is broken: its decoder gave up")))
 }
 
 /// How many pixels a file may have.
@@ -131,11 +151,11 @@ fn pixels(decoder: impl ImageDecoder, room: Room<'_>) -> Result<Picture, LoadErr
     check_size(u64::from(width), u64::from(height), place)?;
     let count = u64::from(width) * u64::from(height);
     if count > most {
-        return Err(place.clone().bad(format!("{bytes} bytes cannot hold {width}×{height} pixels")));
+        return Err(place.bad(format!("{bytes} bytes cannot hold {width}×{height} pixels")));
     }
     folder.draw(count, place)?;
-    let image = DynamicImage::from_decoder(decoder)
-        .map_err(|e| place.clone().bad(format!("the picture is broken: {e}")))?;
+    let image =
+        DynamicImage::from_decoder(decoder).map_err(|e| place.bad(format!("the picture is broken: {e}")))?;
     let samples = match image {
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)
@@ -154,7 +174,7 @@ fn pixels(decoder: impl ImageDecoder, room: Room<'_>) -> Result<Picture, LoadErr
 /// Checks a size from a header, before anything of that size is allocated.
 fn check_size(width: u64, height: u64, place: &Place) -> Result<(), LoadError> {
     if width == 0 || height == 0 {
-        return Err(place.clone().bad("the picture is empty"));
+        return Err(place.bad("the picture is empty"));
     }
-    place.clone().at_most("pixels", width.saturating_mul(height), MAX_TEXTURE_PIXELS as u64)
+    place.at_most("pixels", width.saturating_mul(height), MAX_TEXTURE_PIXELS as u64)
 }

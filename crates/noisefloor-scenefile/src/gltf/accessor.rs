@@ -43,13 +43,13 @@ impl<'a> Reader<'a> {
         let index = index.value();
         let Checked::Valid(GenericComponentType(kind)) = accessor.component_type else {
             let what = format_args!("the componentType of accessor {index} is not one of glTF's");
-            return Err(place.clone().bad(what));
+            return Err(place.bad(what));
         };
         Ok(Self { asset, accessor, index, kind, place })
     }
 
     fn bad(&self, what: impl fmt::Display) -> LoadError {
-        self.place.clone().bad(format_args!("accessor {}: {what}", self.index))
+        self.place.bad(format_args!("accessor {}: {what}", self.index))
     }
 
     fn elements<T: Copy, const N: usize>(
@@ -72,7 +72,7 @@ impl<'a> Reader<'a> {
                 self.slices(view, start, count, size)?.map(element).collect()
             }
             None => {
-                self.place.clone().at_most("elements without data", count, self.asset.bytes())?;
+                self.place.at_most("elements without data", count, self.asset.bytes())?;
                 vec![[convert(0.0); N]; count as usize]
             }
         };

@@ -1,12 +1,13 @@
 //! A glTF file as it is: its JSON, and the bytes that it names.
 
-use super::parts::name;
+use super::parts::{DRACO, INSTANCES, VISIBILITY, WEBP, name};
 use super::{properties, uri};
-use crate::files::Folder;
+use crate::load::Load;
 use crate::{LoadError, Place};
 use gltf::json::root::Get;
 use gltf::json::{Buffer, Index, Root, Value, buffer, deserialize};
-use std::cell::{Cell, OnceCell};
+use std::cell::{Cell, OnceCell, RefCell};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Most bytes that a scene may have in all its files.
@@ -14,11 +15,32 @@ pub(super) const MAX_BYTES: u64 = 1 << 32;
 /// Most objects, arrays and commas of the JSON: a few bytes of text become an object of up to a kilobyte.
 const MAX_VALUES: u64 = 1 << 22;
 
+/// Extensions that a file may require. `KHR_mesh_quantization` is but a wider choice of accessors, all of which are
+/// read; of `KHR_materials_variants` the material without a variant is shown, as its specification has it.
+const KNOWN: &[&str] = &[
+    DRACO,
+    INSTANCES,
+    VISIBILITY,
+    WEBP,
+    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
 /// A parsed file. Nothing that the JSON says is checked beyond the types of its fields.
 #[derive(Debug)]
 pub(super) struct Asset<'a> {
     pub(super) path: &'a Path,
-    folder: &'a Folder,
+    pub(super) load: &'a Load,
     pub(super) root: Root,
     /// Properties that nobody knows, each with what has it.
     pub(super) unread: Vec<(String, String)>,
@@ -26,11 +48,14 @@ pub(super) struct Asset<'a> {
     /// Those that are not the binary chunk, filled when first asked for.
     buffers: Vec<OnceCell<Vec<u8>>>,
     bytes: Cell<u64>,
+    /// Extensions that some warning names.
+    left_out: RefCell<BTreeSet<String>>,
 }
 
 impl<'a> Asset<'a> {
-    /// Parses `file`, the bytes of `path`: JSON or GLB. What it names lies in `folder`.
-    pub(super) fn parse(path: &'a Path, folder: &'a Folder, file: &'a [u8]) -> Result<Self, LoadError> {
+    /// Parses `file`, the bytes of the scene: JSON or GLB.
+    pub(super) fn parse(load: &'a Load, file: &'a [u8]) -> Result<Self, LoadError> {
+        let path = load.path.as_path();
         let (json, binary) = if file.starts_with(b"glTF") { split_glb(path, file)? } else { (file, None) };
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
         let values = json.iter().filter(|b| matches!(b, b'{' | b'[' | b',')).count() as u64;
@@ -58,7 +83,8 @@ impl<'a> Asset<'a> {
             }
         };
         let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
-        Ok(Self { path, folder, root, unread, binary, buffers, bytes: Cell::new(file.len() as u64) })
+        let bytes = Cell::new(file.len() as u64);
+        Ok(Self { path, load, root, unread, binary, buffers, bytes, left_out: RefCell::default() })
     }
 
     /// The element of that index, named by `place`; `kind` is what to call it.
@@ -66,18 +92,13 @@ impl<'a> Asset<'a> {
     where
         Root: Get<T>,
     {
-        let missing = || place.clone().bad(format_args!("{kind} {} does not exist", index.value()));
+        let missing = || place.bad(format_args!("{kind} {} does not exist", index.value()));
         self.root.get(index).ok_or_else(missing)
     }
 
     /// Bytes in all the files read so far: what is allocated stays in proportion to them.
     pub(super) fn bytes(&self) -> u64 {
         self.bytes.get()
-    }
-
-    /// Where its files lie, which counts what compressed data becomes.
-    pub(super) fn folder(&self) -> &Folder {
-        self.folder
     }
 
     /// The bytes of a buffer view that `place` names.
@@ -99,7 +120,7 @@ impl<'a> Asset<'a> {
 
     /// The bytes that `uri` names. They count towards [`MAX_BYTES`].
     pub(super) fn resolve(&self, uri: &str, place: &Place) -> Result<Vec<u8>, LoadError> {
-        let bytes = uri::read(uri, self.folder, place, MAX_BYTES.saturating_sub(self.bytes()))?;
+        let bytes = uri::read(uri, &self.load.folder, place, MAX_BYTES.saturating_sub(self.bytes()))?;
         self.bytes.set(self.bytes() + bytes.len() as u64);
         Ok(bytes)
     }
@@ -147,6 +168,43 @@ impl<'a> Asset<'a> {
     }
 }
 
+// What a load does without.
+
+impl Asset<'_> {
+    /// An element has these extensions, which are ignored.
+    pub(super) fn leave_out<'n>(&self, place: &Place, names: impl IntoIterator<Item = &'n String>) {
+        for name in names {
+            self.load.ignored(place, format_args!("the extension {name} is ignored"));
+            self.left_out.borrow_mut().insert(name.clone());
+        }
+    }
+
+    /// Warns of properties that nobody knows, and of the extensions that the file uses but no element that was read.
+    pub(super) fn say_unread(&self) {
+        for (place, property) in &self.unread {
+            let place = Place::part(self.path, place);
+            self.load.ignored(&place, format_args!("the property `{property}` is ignored"));
+        }
+        let place = Place::part(self.path, "extensionsUsed");
+        let mentioned = self.left_out.take();
+        let used = self.root.extensions_used.iter().filter(|name| !mentioned.contains(*name));
+        self.leave_out(&place, used.filter(|name| !KNOWN.contains(&name.as_str())));
+    }
+
+    /// Checks that the file requires no extension that would be missed.
+    pub(super) fn check_required(&self) -> Result<(), LoadError> {
+        let required = self.root.extensions_required.iter();
+        let missing: Vec<&str> = required.map(String::as_str).filter(|name| !KNOWN.contains(name)).collect();
+        let each = match missing.len() {
+            0 => return Ok(()),
+            1 => "the extension",
+            _ => "each of the extensions",
+        };
+        let what = format_args!("{each} {}, which the file requires,", missing.join(", "));
+        Err(Place::part(self.path, "extensionsRequired").unsupported(what))
+    }
+}
+
 /// The JSON and the binary chunk of a GLB file (glTF 2.0, §4.4).
 fn split_glb<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), LoadError> {
     let place = Place::part(path, "GLB header");
@@ -159,7 +217,7 @@ fn split_glb<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u
     }
     let mut chunks = file.get(12..length as usize).ok_or_else(|| {
         let found = file.len();
-        place.clone().bad(format_args!(
+        place.bad(format_args!(
             "it says that the file has {length} bytes, but it has {found}; it may be cut short"
         ))
     })?;
@@ -196,29 +254,4 @@ fn next_chunk<'a>(path: &Path, bytes: &mut &'a [u8]) -> Result<([u8; 4], &'a [u8
 /// Little-endian words.
 fn words<const N: usize>(bytes: &[u8]) -> [u32; N] {
     std::array::from_fn(|i| u32::from_le_bytes(std::array::from_fn(|j| bytes[4 * i + j])))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn glb_files_are_split_into_their_chunks() {
-        let mut file = b"glTF\x02\0\0\0".to_vec();
-        file.extend(40u32.to_le_bytes());
-        file.extend(4u32.to_le_bytes());
-        file.extend(b"JSON{}  ");
-        file.extend(8u32.to_le_bytes());
-        file.extend(b"BIN\0abcdefgh");
-        assert_eq!(file.len(), 40);
-        let path = Path::new("a.glb");
-        let (json, binary) = split_glb(path, &file).unwrap();
-        assert_eq!((json, binary), (&b"{}  "[..], Some(&b"abcdefgh"[..])));
-        for length in 0..40 {
-            assert!(split_glb(path, &file[..length]).is_err(), "cut at {length}");
-        }
-        // A header that is shorter than itself
-        file[8] = 3;
-        assert!(split_glb(path, &file).is_err());
-    }
 }

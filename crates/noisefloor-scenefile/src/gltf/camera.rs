@@ -2,7 +2,6 @@
 
 use super::asset::Asset;
 use super::nodes::Placed;
-use super::notes::Notes;
 use super::parts::name;
 use crate::{LoadError, Place};
 use glam::DVec3;
@@ -14,15 +13,11 @@ use noisefloor_ptwne::{Camera, Optics};
 const DEFAULT_FOV: f64 = 40.0;
 
 /// The first camera of the scene.
-pub(super) fn first(
-    asset: &Asset<'_>,
-    placed: &[Placed<'_>],
-    notes: &mut Notes,
-) -> Result<Option<(Camera, Optics)>, LoadError> {
+pub(super) fn first(asset: &Asset<'_>, placed: &[Placed<'_>]) -> Result<Option<(Camera, Optics)>, LoadError> {
     let mut cameras = placed.iter().filter_map(|p| p.node.camera.map(|camera| (p, camera)));
     let Some((at, index)) = cameras.next() else { return Ok(None) };
     for (other, _) in cameras {
-        notes.warn(&other.place, "its camera is ignored: the scene is seen from the first");
+        asset.load.ignored(&other.place, "its camera is ignored: the scene is seen from the first");
     }
     let source = asset.get(index, "camera", &at.place)?;
     let place = Place::part(asset.path, name("camera", index.value(), source.name.as_deref()));
@@ -34,16 +29,11 @@ pub(super) fn first(
         (Checked::Valid(Type::Orthographic), _, Some(seen)) => (DEFAULT_FOV, Some(2.0 * seen.ymag.abs())),
         _ => return Err(place.bad("it is no perspective or orthographic camera with its properties")),
     };
-    notes.extensions(&place, source.extensions.iter().flat_map(|e| e.others.keys()));
+    asset.leave_out(&place, source.extensions.iter().flat_map(|e| e.others.keys()));
     let axes = at.to_world.matrix3;
     let [view, up] = [-axes.z_axis, axes.y_axis].map(DVec3::normalize_or_zero);
     let optics = Optics { parallel_height, ..Optics::default() };
     Ok(Some((camera(at.to_world.translation, view, up, fov), optics)))
-}
-
-/// Any camera, until there is one that sees the scene.
-pub(super) fn anywhere() -> Camera {
-    camera(DVec3::Z, DVec3::NEG_Z, DVec3::Y, DEFAULT_FOV)
 }
 
 /// A camera that sees the whole box from in front of it, above and to the right.

@@ -1,6 +1,6 @@
 //! `KHR_materials_clearcoat`.
 
-use super::notes::Notes;
+use super::asset::Asset;
 use crate::{LoadError, Place};
 use gltf::json::texture::Info;
 use gltf::json::{Value, deserialize};
@@ -27,18 +27,18 @@ pub(super) struct Coat {
 }
 
 /// Reads the extension; none if there is no coat.
-pub(super) fn parse(value: &Value, place: &Place, notes: &mut Notes) -> Result<Option<Clearcoat>, LoadError> {
+pub(super) fn parse(asset: &Asset<'_>, value: &Value, place: &Place) -> Result<Option<Clearcoat>, LoadError> {
     let factor = number(value, "clearcoatFactor", place)?;
     let roughness = number(value, "clearcoatRoughnessFactor", place)?;
     if factor == 0.0 {
         return Ok(None);
     }
     if value.get("clearcoatNormalTexture").is_some() {
-        notes.warn(place, "the normal map of its coat is ignored: the coat is smooth");
+        asset.load.ignored(place, "the normal map of its coat is ignored: the coat is smooth");
     }
     let texture = |name: &str| {
         let info = value.get(name).map(|info| deserialize::from_value::<Info>(info.clone()));
-        info.transpose().map_err(|e| place.clone().bad(format_args!("its {NAME}: {e}")))
+        info.transpose().map_err(|e| place.bad(format_args!("its {NAME}: {e}")))
     };
     let (texture, roughness_texture) = (texture("clearcoatTexture")?, texture("clearcoatRoughnessTexture")?);
     Ok(Some(Clearcoat { factor, texture, roughness, roughness_texture }))
@@ -48,7 +48,7 @@ pub(super) fn parse(value: &Value, place: &Place, notes: &mut Notes) -> Result<O
 fn number(value: &Value, name: &str, place: &Place) -> Result<f32, LoadError> {
     let Some(number) = value.get(name) else { return Ok(0.0) };
     let number = number.as_f64().filter(|x| (0.0..=1.0).contains(x));
-    number.map(|x| x as f32).ok_or_else(|| place.clone().bad(format_args!("its {name} is no number of 0…1")))
+    number.map(|x| x as f32).ok_or_else(|| place.bad(format_args!("its {name} is no number of 0…1")))
 }
 
 impl Coat {

@@ -48,17 +48,14 @@ pub(super) fn inflated(mut asset: Asset<'_>) -> Result<Asset<'_>, LoadError> {
     for group in all.chunk_by(|(_, a), (_, b)| a.view.value() == b.view.value()) {
         let (_, first) = &group[0];
         // A short file can stand for many triangles
-        let left = asset.folder().left();
+        let left = asset.load.folder.left();
         has_memory(first.declared.min(left / KEPT_EACH), BYTES_EACH, &first.place)?;
         let mesh = decoded(&asset, first, left)?;
         let elements = (mesh.num_points() + mesh.num_faces()) as u64;
-        asset.folder().inflate(elements.saturating_mul(KEPT_EACH), &first.place)?;
+        asset.load.folder.inflate(elements.saturating_mul(KEPT_EACH), &first.place)?;
         let past = |corner: &PointIndex| corner.0 as usize >= mesh.num_points();
         if mesh.faces().iter().flatten().any(past) {
-            return Err(first
-                .place
-                .clone()
-                .bad("a triangle of its Draco data has a corner past the vertices"));
+            return Err(first.place.bad("a triangle of its Draco data has a corner past the vertices"));
         }
         let faces: Vec<u8> =
             mesh.faces().iter().flatten().flat_map(|corner| corner.0.to_le_bytes()).collect();
@@ -70,7 +67,7 @@ pub(super) fn inflated(mut asset: Asset<'_>) -> Result<Asset<'_>, LoadError> {
                 let Checked::Valid(semantic) = semantic else { continue };
                 let Some(id) = compressed.attributes.get(&semantic.to_string()) else { continue };
                 let place = &compressed.place;
-                let missing = || place.clone().bad(format_args!("its Draco data has no attribute {id}"));
+                let missing = || place.bad(format_args!("its Draco data has no attribute {id}"));
                 let values = mesh.attribute_by_unique_id(*id).ok_or_else(missing)?;
                 let accessor = asset.get(*index, "accessor", place)?;
                 let accessor = described(accessor, values, mesh.num_points(), semantic, place)?;
@@ -110,7 +107,7 @@ fn compressed(
     if positions.buffer_view.is_some() || positions.sparse.is_some() {
         return Ok(None);
     }
-    let bad = |what: &str| place.clone().bad(format_args!("{NAME}: {what}"));
+    let bad = |what: &str| place.bad(format_args!("{NAME}: {what}"));
     let view = extension.get("bufferView").and_then(Value::as_u64).and_then(|view| u32::try_from(view).ok());
     let view = Index::new(view.ok_or_else(|| bad("it needs a bufferView"))?);
     let attributes = extension.get("attributes").cloned().unwrap_or_default();
@@ -136,18 +133,16 @@ fn decoded(asset: &Asset<'_>, compressed: &Compressed, left: u64) -> Result<drac
     if let Some([b'D', b'R', b'A', b'C', b'O', major, minor]) = data.first_chunk()
         && (*major, *minor) != (2, 2)
     {
-        return Err(place.clone().unsupported(format_args!("version {major}.{minor} of Draco data")));
+        return Err(place.unsupported(format_args!("version {major}.{minor} of Draco data")));
     }
     let mut buffer = DecoderBuffer::new(data).with_limits(limits);
     let mut mesh = draco_core::Mesh::new();
     let failed = |cause: DracoError| match cause.kind() {
         ErrorKind::LimitExceeded => {
-            place.clone().bad(format_args!("its Draco data is out of proportion to the file: {cause}"))
+            place.bad(format_args!("its Draco data is out of proportion to the file: {cause}"))
         }
-        ErrorKind::UnsupportedFeature => {
-            place.clone().unsupported(format_args!("this kind of Draco data ({cause})"))
-        }
-        _ => place.clone().bad(format_args!("its Draco data cannot be decoded: {cause}")),
+        ErrorKind::UnsupportedFeature => place.unsupported(format_args!("this kind of Draco data ({cause})")),
+        _ => place.bad(format_args!("its Draco data cannot be decoded: {cause}")),
     };
     MeshDecoder::new().decode(&mut buffer, &mut mesh).map_err(failed)?;
     Ok(mesh)
@@ -170,7 +165,7 @@ fn described(
         DataType::Float32 => ComponentType::F32,
         other => {
             let what = format_args!("{} of the type {other:?} in Draco data", semantic.to_string());
-            return Err(place.clone().unsupported(what));
+            return Err(place.unsupported(what));
         }
     };
     let expected = match accessor.type_ {
@@ -181,7 +176,7 @@ fn described(
     if expected != found {
         let what =
             format_args!("{} has {found} numbers in its Draco data, not {expected}", semantic.to_string());
-        return Err(place.clone().bad(what));
+        return Err(place.bad(what));
     }
     Ok(Accessor {
         byte_offset: None,
@@ -205,7 +200,7 @@ fn bytes_of(
     for point in 0..points {
         let start = (values.mapped_index(PointIndex(point as u32)).0 as usize).checked_mul(stride);
         let value = start.and_then(|start| data.get(start..)?.get(..size)).ok_or_else(|| {
-            place.clone().bad(format_args!("{} has no value {point} in Draco data", semantic.to_string()))
+            place.bad(format_args!("{} has no value {point} in Draco data", semantic.to_string()))
         })?;
         bytes.extend(value);
     }

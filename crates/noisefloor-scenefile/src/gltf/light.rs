@@ -2,7 +2,6 @@
 
 use super::asset::Asset;
 use super::nodes::Placed;
-use super::notes::Notes;
 use super::parts::name;
 use crate::{LoadError, Place};
 use glam::Vec3;
@@ -23,12 +22,11 @@ pub(super) fn add(
     placed: &Placed<'_>,
     index: Index<Light>,
     builder: &mut SceneBuilder,
-    notes: &mut Notes,
 ) -> Result<(), LoadError> {
     let light = asset.get(index, "light", &placed.place)?;
     let place = Place::part(asset.path, name("light", index.value(), light.name.as_deref()));
     if light.range.is_some() {
-        notes.warn(&place, "its range is ignored: light reaches any distance");
+        asset.load.ignored(&place, "its range is ignored: light reaches any distance");
     }
     let power = light.color.map(|x| x * light.intensity);
     let position = placed.to_world.translation.as_vec3().to_array();
@@ -45,7 +43,7 @@ pub(super) fn add(
         }
         _ => return Err(place.bad("it is not a point, directional or spot light with its properties")),
     };
-    builder.punctual(punctual).map_err(|cause| LoadError::Scene { place, cause })
+    builder.punctual(punctual).map_err(place.refused())
 }
 
 // Whether a scene has light of its own.

@@ -4,7 +4,6 @@ use super::asset::Asset;
 use super::material::Materials;
 use super::mesh::{self, Triangles};
 use super::nodes::Placed;
-use super::notes::Notes;
 use super::parts::{INSTANCES, VISIBILITY, name};
 use super::rest::{self, Joints};
 use super::shared::Shared;
@@ -22,7 +21,6 @@ pub(super) struct Loader<'a> {
     pub(super) asset: &'a Asset<'a>,
     pub(super) builder: SceneBuilder,
     pub(super) materials: Materials<'a>,
-    pub(super) notes: Notes,
     /// Meshes that some node has shown already: warnings come with the first.
     pub(super) meshes: HashSet<usize>,
     /// Where nodes are, by their index.
@@ -45,10 +43,10 @@ impl Loader<'_> {
         let Placed { node, place, .. } = placed;
         let read = |name: &&String| [INSTANCES, VISIBILITY].contains(&name.as_str());
         let others = node.extensions.iter().flat_map(|e| e.others.keys());
-        self.notes.extensions(place, others.filter(|name| !read(name)));
+        self.asset.leave_out(place, others.filter(|name| !read(name)));
         let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         if let Some(light) = light.filter(|_| placed.visible) {
-            light::add(self.asset, placed, light.light, &mut self.builder, &mut self.notes)?;
+            light::add(self.asset, placed, light.light, &mut self.builder)?;
         }
         let Some(index) = node.mesh.filter(|_| !placed.shown.is_empty()) else { return Ok(()) };
         let mesh = self.asset.get(index, "mesh", place)?;
@@ -56,7 +54,7 @@ impl Loader<'_> {
         let mut first = self.meshes.insert(index.value());
         if first {
             let place = Place::part(self.asset.path, &called);
-            self.notes.extensions(&place, mesh.extensions.iter().flat_map(|e| e.others.keys()));
+            self.asset.leave_out(&place, mesh.extensions.iter().flat_map(|e| e.others.keys()));
         }
         let joints = match node.skin {
             Some(skin) => Some(self.joints(skin, place)?),
@@ -105,7 +103,7 @@ impl Loader<'_> {
 
     /// Warns of what a primitive has and nobody reads.
     fn warn_of_what_is_ignored(&mut self, primitive: &Primitive, drawn: bool, place: &Place) {
-        self.notes.extensions(place, primitive.extensions.iter().flat_map(|e| e.others.keys()));
+        self.asset.leave_out(place, primitive.extensions.iter().flat_map(|e| e.others.keys()));
         let has = |semantic| mesh::attribute(primitive, semantic).is_some();
         for (there, what) in [
             (!drawn, "its points or lines are ignored"),
@@ -114,7 +112,7 @@ impl Loader<'_> {
             (has(Semantic::Joints(1)), "its joints beyond four a vertex are ignored"),
         ] {
             if there {
-                self.notes.warn(place, what);
+                self.asset.load.ignored(place, what);
             }
         }
     }
@@ -129,8 +127,8 @@ impl Loader<'_> {
         let extensions = primitive.extensions.iter().flat_map(|e| e.others.keys());
         let names: Vec<&str> = extensions.map(String::as_str).collect();
         Err(match names.as_slice() {
-            [] => place.clone().bad(format_args!("its positions, accessor {}, have no data", index.value())),
-            names => place.clone().unsupported(format_args!("a mesh of only {}", names.join(", "))),
+            [] => place.bad(format_args!("its positions, accessor {}, have no data", index.value())),
+            names => place.unsupported(format_args!("a mesh of only {}", names.join(", "))),
         })
     }
 
@@ -155,8 +153,7 @@ impl Loader<'_> {
         }
         self.has_data(primitive, place)?;
         let corners = mesh::corners(self.asset, primitive, place)?;
-        let (builder, notes) = (&mut self.builder, &mut self.notes);
-        let material = self.materials.material(primitive.material, corners, place, builder, notes)?;
+        let material = self.materials.material(primitive.material, corners, place, &mut self.builder)?;
         let shines = material.emission.is_some();
         if shines && in_object {
             return Ok(true);
@@ -164,7 +161,7 @@ impl Loader<'_> {
         let mut triangles = mesh::triangles(self.asset, primitive, mode, &material, place)?;
         if triangles.indices.is_empty() {
             if first && mesh::attribute(primitive, Semantic::Positions).is_some() {
-                self.notes.warn(place, "it has no whole triangle");
+                self.asset.load.ignored(place, "it has no whole triangle");
             }
             return Ok(false);
         }
@@ -173,7 +170,7 @@ impl Loader<'_> {
             if let Some(set) = set.filter(|_| uvs.is_empty()) {
                 if first {
                     let what = format_args!("it has no set {set} of texture coordinates: all are 0");
-                    self.notes.warn(place, what);
+                    self.asset.load.ignored(place, what);
                 }
                 *uvs = vec![[0.0, 1.0]; count];
             }
@@ -198,13 +195,15 @@ impl Loader<'_> {
             Ok(0) => {}
             Ok(count) => {
                 if first {
-                    self.notes.warn(place, format_args!("triangles without area are left out: {count}"));
+                    self.asset
+                        .load
+                        .ignored(place, format_args!("triangles without area are left out: {count}"));
                 }
             }
             Err(SceneError::EmptyEmitter) => {
-                self.notes.warn(place, "it is left out: it shines, but has no area");
+                self.asset.load.ignored(place, "it is left out: it shines, but has no area");
             }
-            Err(cause) => return Err(LoadError::Scene { place: place.clone(), cause }),
+            Err(cause) => return Err(place.refused()(cause)),
         }
         Ok(shines)
     }
@@ -233,7 +232,7 @@ impl Loader<'_> {
         });
         match self.builder.instance(shared.object, rows) {
             Err(SceneError::Singular) => return Ok(None),
-            shown => shown.map_err(|cause| LoadError::Scene { place: place.clone(), cause })?,
+            shown => shown.map_err(place.refused())?,
         }
         let [low, high] = shared.bounds;
         if low.cmple(high).all() {
@@ -248,19 +247,19 @@ impl Loader<'_> {
 
     /// Adds what the nodes that show a mesh share.
     fn object(&mut self, mesh: &json::Mesh, called: &str, place: &Place) -> Result<Shared, LoadError> {
-        let refused = |cause| LoadError::Scene { place: place.clone(), cause };
+        let refused = place.refused();
         let weights = mesh.weights.as_deref().unwrap_or_default();
         let pose = Pose { to_world: &DAffine3::IDENTITY, joints: None, weights };
         let outside = std::mem::replace(&mut self.bounds, [DVec3::INFINITY, DVec3::NEG_INFINITY]);
         let mut shining = HashSet::new();
-        self.builder.begin_object().map_err(refused)?;
+        self.builder.begin_object().map_err(&refused)?;
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = Place::part(self.asset.path, format_args!("{called}, primitive {number}"));
             if self.primitive(primitive, &pose, true, true, &place)? {
                 shining.insert(number);
             }
         }
-        let object = self.builder.end_object().map_err(refused)?;
+        let object = self.builder.end_object().map_err(&refused)?;
         let bounds = std::mem::replace(&mut self.bounds, outside);
         Ok(Shared { object, bounds, shining })
     }

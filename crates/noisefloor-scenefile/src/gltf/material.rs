@@ -3,7 +3,6 @@
 use super::asset::Asset;
 use super::clearcoat::{self, Clearcoat, Coat};
 use super::gloss::Gloss;
-use super::notes::Notes;
 use super::parts::{AddedMaterial, Corners, name};
 use super::texture::{Encoding, Textures, normal_info, set};
 use crate::{LoadError, Place};
@@ -44,7 +43,6 @@ impl<'a> Materials<'a> {
         corners: Corners,
         place: &Place,
         builder: &mut SceneBuilder,
-        notes: &mut Notes,
     ) -> Result<AddedMaterial, LoadError> {
         let key = (index.map(|index| index.value()), corners);
         if let Some(added) = self.added.get(&key) {
@@ -59,14 +57,20 @@ impl<'a> Materials<'a> {
             None => (&default, "default material".to_owned()),
         };
         let place = Place::part(self.asset.path, called);
-        let mut reader =
-            Reader { source, place, sets: [None; 2], corners, textures: &mut self.textures, notes };
+        let mut reader = Reader {
+            asset: self.asset,
+            source,
+            place,
+            sets: [None; 2],
+            corners,
+            textures: &mut self.textures,
+        };
         let read = reader.read()?;
         let coat = if read.unlit { None } else { reader.coat()? };
         let (sets, place) = (reader.sets, reader.place);
         let Read { material, cover, emission, unlit } = read;
         let normal_map = cover.relief.is_some();
-        let refused = |cause| LoadError::Scene { place: place.clone(), cause };
+        let refused = place.refused();
         let id = match coat {
             None => builder.material_with(material, cover).map_err(refused)?,
             Some(coat) => coat.over(material, cover, builder).map_err(refused)?,
@@ -78,12 +82,12 @@ impl<'a> Materials<'a> {
 }
 
 struct Reader<'m, 'a> {
+    asset: &'a Asset<'a>,
     source: &'m Source,
     place: Place,
     sets: [Option<u32>; 2],
     corners: Corners,
     textures: &'m mut Textures<'a>,
-    notes: &'m mut Notes,
 }
 
 struct Read {
@@ -98,12 +102,12 @@ impl<'m> Reader<'m, '_> {
         let source = self.source;
         let pbr = &source.pbr_metallic_roughness;
         if source.occlusion_texture.is_some() {
-            self.notes.warn(&self.place, "an occlusion map is ignored: light is traced");
+            self.asset.load.ignored(&self.place, "an occlusion map is ignored: light is traced");
         }
         let others = source.extensions.iter().flat_map(|e| e.others.keys());
         let known = [clearcoat::NAME, SPECULAR];
-        self.notes.extensions(&self.place, others.filter(|name| !known.contains(&name.as_str())));
-        self.notes.extensions(&self.place, pbr.extensions.iter().flat_map(|e| e.others.keys()));
+        self.asset.leave_out(&self.place, others.filter(|name| !known.contains(&name.as_str())));
+        self.asset.leave_out(&self.place, pbr.extensions.iter().flat_map(|e| e.others.keys()));
 
         // The first texture chooses the first set of texture coordinates, the first with another the second
         let gloss = self.extensions().and_then(|e| e.pbr_specular_glossiness.as_ref());
@@ -116,7 +120,7 @@ impl<'m> Reader<'m, '_> {
         let mut normals = source.normal_texture.as_ref().map(|normals| (normal_info(normals), normals.scale));
         // White changes no factor, but as a normal it would lean
         if normals.as_ref().is_some_and(|(info, _)| !self.textures.has_image(info)) {
-            self.notes.warn(&self.place, "its normal map names no image: it is left out");
+            self.asset.load.ignored(&self.place, "its normal map names no image: it is left out");
             normals = None;
         }
         let all = [base_texture, metal_texture, normals.as_ref().map(|n| &n.0), emissive_texture];
@@ -133,7 +137,7 @@ impl<'m> Reader<'m, '_> {
         };
         let relief = match normals.filter(|(info, _)| self.fits(info)) {
             Some((info, scale)) => {
-                let map = self.textures.colour(&info, Encoding::Linear, &self.place, self.notes)?;
+                let map = self.textures.colour(&info, Encoding::Linear, &self.place)?;
                 let scale = self.within(scale, "scale of the normal map", -1e6, 1e6);
                 Some(Relief::Normals { map: Texture::Image(map), scale, mirrors: true })
             }
@@ -160,19 +164,19 @@ impl<'m> Reader<'m, '_> {
             return Ok(None);
         };
         let Some(Clearcoat { factor, texture, roughness, roughness_texture }) =
-            clearcoat::parse(value, &self.place, self.notes)?
+            clearcoat::parse(self.asset, value, &self.place)?
         else {
             return Ok(None);
         };
         let share = match texture.filter(|info| self.fits(info)) {
             Some(info) => {
-                let image = self.textures.red(&info, &self.place, self.notes)?;
+                let image = self.textures.red(&info, &self.place)?;
                 Texture::Image(ImageTexture { factor: [factor; 3], ..image })
             }
             None => Texture::Colour([factor; 3]),
         };
         let alphas = match roughness_texture.filter(|info| self.fits(info)) {
-            Some(info) => Some(self.textures.alphas(&info, roughness, &self.place, self.notes)?),
+            Some(info) => Some(self.textures.alphas(&info, roughness, &self.place)?),
             None => None,
         };
         Ok(Some(Coat { share, roughness: roughness * roughness, alphas }))
@@ -203,18 +207,20 @@ impl<'m> Reader<'m, '_> {
         let specular = gloss.specular_factor.0.map(|x| self.within(x, "specularFactor", 0.0, 1.0));
         let glossiness = self.within(gloss.glossiness_factor.0, "glossinessFactor", 0.0, 1.0);
         let factor = Gloss { diffuse, specular, glossiness };
-        self.notes.near(&self.place, "its specular colour and glossiness become metal and roughness");
+        self.asset
+            .load
+            .approximated(&self.place, "its specular colour and glossiness become metal and roughness");
         let of_diffuse = gloss.diffuse_texture.as_ref().filter(|info| self.fits(info));
         let of_specular = gloss.specular_glossiness_texture.as_ref();
         // Both become one picture
         let apart = of_specular.zip(of_diffuse).is_some_and(|(one, other)| set(one) != set(other));
         if apart {
             let what = "its specularGlossinessTexture is ignored: it uses another set of texture coordinates";
-            self.notes.warn(&self.place, what);
+            self.asset.load.ignored(&self.place, what);
         }
         let of_specular = of_specular.filter(|info| !apart && self.fits(info));
         let (base, metallic_roughness) =
-            self.textures.gloss(factor, [of_diffuse, of_specular], &self.place, self.notes)?;
+            self.textures.gloss(factor, [of_diffuse, of_specular], &self.place)?;
         let base = self.tinted(base);
         let ior = self.dielectric();
         Ok(Material::MetallicRoughness { base, metallic_roughness, ior })
@@ -236,7 +242,7 @@ impl<'m> Reader<'m, '_> {
         encoding: Encoding,
     ) -> Result<Texture, LoadError> {
         let Some(info) = texture.filter(|info| self.fits(info)) else { return Ok(factor.into()) };
-        let image = self.textures.colour(info, encoding, &self.place, self.notes)?;
+        let image = self.textures.colour(info, encoding, &self.place)?;
         Ok(Texture::Image(ImageTexture { factor, ..image }))
     }
 
@@ -254,7 +260,7 @@ impl<'m> Reader<'m, '_> {
                 info.index.value(),
                 self.sets[1].unwrap_or_default()
             );
-            self.notes.warn(&self.place, what);
+            self.asset.load.ignored(&self.place, what);
         }
         fits
     }
@@ -282,22 +288,24 @@ impl<'m> Reader<'m, '_> {
             return Ok(None);
         };
         if transmission.transmission_texture.is_some() {
-            self.notes.warn(&self.place, "its transmission texture is ignored, only its factor used");
+            self.asset.load.ignored(&self.place, "its transmission texture is ignored, only its factor used");
         }
         let share = self.within(transmission.transmission_factor.0, "transmissionFactor", 0.0, 1.0);
         if share > 0.0 && share < 1.0 {
             let what = if share >= 0.5 { "1: all glass" } else { "0: opaque" };
-            self.notes.warn(&self.place, format_args!("a transmissionFactor of {share} is taken for {what}"));
+            self.asset
+                .load
+                .ignored(&self.place, format_args!("a transmissionFactor of {share} is taken for {what}"));
         }
         if share < 0.5 {
             return Ok(None);
         }
         let pbr = &self.source.pbr_metallic_roughness;
         if base.is_some() {
-            self.notes.warn(&self.place, "its base colour texture is ignored: glass has one tint");
+            self.asset.load.ignored(&self.place, "its base colour texture is ignored: glass has one tint");
         }
         if self.corners != Corners::Nothing {
-            self.notes.warn(&self.place, "the colours of corners are ignored: glass has one tint");
+            self.asset.load.ignored(&self.place, "the colours of corners are ignored: glass has one tint");
         }
         let [r, g, b, _] = pbr.base_color_factor.0;
         let tint = [r, g, b].map(|x| self.within(x, "baseColorFactor", 0.0, 1.0));
@@ -305,9 +313,7 @@ impl<'m> Reader<'m, '_> {
         let ior = self.ior(0.25);
         if self.is_solid() {
             let map = match &pbr.metallic_roughness_texture {
-                Some(info) if self.fits(info) => {
-                    Some(self.textures.alphas(info, roughness, &self.place, self.notes)?)
-                }
+                Some(info) if self.fits(info) => Some(self.textures.alphas(info, roughness, &self.place)?),
                 _ => None,
             };
             let glass = Material::RoughGlass { ior, tint, roughness: roughness * roughness };
@@ -315,7 +321,7 @@ impl<'m> Reader<'m, '_> {
         }
         if roughness > 0.0 {
             let what = format_args!("a roughness of {roughness} is ignored: panes are smooth");
-            self.notes.warn(&self.place, what);
+            self.asset.load.ignored(&self.place, what);
         }
         Ok(Some((Material::ThinGlass { ior, tint }, None)))
     }
@@ -326,7 +332,7 @@ impl<'m> Reader<'m, '_> {
         let volume = self.extensions().and_then(|e| e.volume.as_ref());
         let Some(volume) = volume.filter(|volume| volume.thickness_factor.0 > 0.0) else { return false };
         if volume.attenuation_distance.0.is_finite() && volume.attenuation_color.0 != [1.0; 3] {
-            self.notes.warn(&self.place, "the attenuation in its volume is ignored: glass is clear");
+            self.asset.load.ignored(&self.place, "the attenuation in its volume is ignored: glass is clear");
         }
         true
     }
@@ -342,7 +348,7 @@ impl<'m> Reader<'m, '_> {
             Checked::Valid(AlphaMode::Opaque) => return Ok((None, None)),
             Checked::Valid(AlphaMode::Blend) => None,
             Checked::Valid(AlphaMode::Mask) => Some(self.source.alpha_cutoff.unwrap_or_default().0),
-            Checked::Invalid => return Err(self.place.clone().bad("its alphaMode is not one of glTF's")),
+            Checked::Invalid => return Err(self.place.bad("its alphaMode is not one of glTF's")),
         };
         let factor = self.within(alpha, "alpha of baseColorFactor", 0.0, 1.0);
         let image = match base.filter(|info| self.sets.contains(&Some(set(info)))) {
@@ -393,7 +399,7 @@ impl<'m> Reader<'m, '_> {
         let share = number(value.get("specularFactor"));
         let colour = [0, 1, 2].map(|i| number(value.get("specularColorFactor").and_then(|c| c.get(i))));
         if value.get("specularTexture").or(value.get("specularColorTexture")).is_some() {
-            self.notes.warn(&self.place, "the textures of its KHR_materials_specular are ignored");
+            self.asset.load.ignored(&self.place, "the textures of its KHR_materials_specular are ignored");
         }
         if share == 1.0 && colour == [1.0; 3] {
             return ior;
@@ -403,7 +409,7 @@ impl<'m> Reader<'m, '_> {
         let nearest = ((1.0 + root) / (1.0 - root)).min(MAX_IOR);
         let what =
             format_args!("its KHR_materials_specular is replaced by an index of refraction of {nearest:.3}");
-        self.notes.near(&self.place, what);
+        self.asset.load.approximated(&self.place, what);
         nearest
     }
 
@@ -417,7 +423,7 @@ impl<'m> Reader<'m, '_> {
     fn within(&mut self, x: f32, what: &str, min: f32, max: f32) -> f32 {
         let nearest = x.clamp(min, max);
         if nearest != x {
-            self.notes.warn(&self.place, format_args!("{what} is {x}, taken for {nearest}"));
+            self.asset.load.ignored(&self.place, format_args!("{what} is {x}, taken for {nearest}"));
         }
         nearest
     }

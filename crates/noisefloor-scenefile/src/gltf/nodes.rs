@@ -28,7 +28,7 @@ pub(super) fn placed<'a>(asset: &'a Asset<'a>) -> Result<Vec<Placed<'a>>, LoadEr
     let scene = match root.scene {
         Some(index) => asset.get(index, "scene", &file)?,
         None => {
-            let none = || file.clone().bad("it has no scene, only parts for other files");
+            let none = || file.bad("it has no scene, only parts for other files");
             root.scenes.first().ok_or_else(none)?
         }
     };
@@ -46,9 +46,8 @@ pub(super) fn placed<'a>(asset: &'a Asset<'a>) -> Result<Vec<Placed<'a>>, LoadEr
             return Err(place.bad(what));
         }
         let to_world = parent
-            * local(node).ok_or_else(|| {
-                place.clone().bad("its rotation is zero or not finite, not a unit quaternion")
-            })?;
+            * local(node)
+                .ok_or_else(|| place.bad("its rotation is zero or not finite, not a unit quaternion"))?;
         let extension = |name: &str| node.extensions.as_ref().and_then(|e| e.others.get(name));
         let hidden = extension(VISIBILITY).and_then(|e| e.get("visible")) == Some(&Value::Bool(false));
         let visible = visible && !hidden;
@@ -90,7 +89,7 @@ fn instances_of(
     to_world: DAffine3,
     place: &Place,
 ) -> Result<Vec<DAffine3>, LoadError> {
-    let bad = |what: &str| place.clone().bad(format_args!("{INSTANCES}: {what}"));
+    let bad = |what: &str| place.bad(format_args!("{INSTANCES}: {what}"));
     let attributes = extension.get("attributes").and_then(Value::as_object);
     let attributes = attributes.ok_or_else(|| bad("it needs `attributes`"))?;
     let accessor = |index: &Value| {
@@ -105,7 +104,7 @@ fn instances_of(
     }
     // Accessors without data have any count, and any number of nodes may name one
     let bytes = count.unwrap_or(0).saturating_mul(size_of::<DAffine3>() as u64);
-    asset.folder().inflate(bytes, place)?;
+    asset.load.folder.inflate(bytes, place)?;
     let rows = |key: &str| attributes.get(key).map(accessor);
     let translations = rows("TRANSLATION").map(|index| floats::<3>(asset, index, place)).transpose()?;
     let rotations = rows("ROTATION").map(|index| floats::<4>(asset, index, place)).transpose()?;

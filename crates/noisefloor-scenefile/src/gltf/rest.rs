@@ -28,7 +28,7 @@ pub(super) fn joints(
         Some(accessor) => {
             // Any number of skins may name the same matrices
             let count = asset.get(accessor, "accessor", &here)?.count.0;
-            asset.folder().inflate(count.saturating_mul(64), &here)?;
+            asset.load.folder.inflate(count.saturating_mul(64), &here)?;
             floats::<16>(asset, accessor, &here)?
         }
         None => vec![],
@@ -39,7 +39,7 @@ pub(super) fn joints(
     }
     let joint = |(number, joint): (usize, &Index<_>)| {
         asset.get(*joint, "node", &here)?;
-        let outside = || here.clone().bad(format_args!("its joint {} is not in the scene", joint.value()));
+        let outside = || here.bad(format_args!("its joint {} is not in the scene", joint.value()));
         let to_world = nodes.get(&joint.value()).copied().ok_or_else(outside)?;
         Ok(to_world * inverse.get(number).map_or(DAffine3::IDENTITY, |m| affine(m.map(f64::from))))
     };
@@ -73,7 +73,7 @@ pub(super) fn skin(
         for (joint, weight) in of.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
             let weight = f64::from(*weight);
             let joint = joints.get(*joint as usize).ok_or_else(|| {
-                place.clone().bad(format_args!("joint {joint} is past the {} of its skin", joints.len()))
+                place.bad(format_args!("joint {joint} is past the {} of its skin", joints.len()))
             })?;
             matrix += joint.matrix3 * weight;
             shift += joint.translation * weight;
@@ -127,7 +127,7 @@ fn rows<const N: usize>(
     let found = asset.get(index, "accessor", place)?.count.0;
     if found != count as u64 {
         let what = format_args!("it has {count} positions, but {found} in accessor {}", index.value());
-        return Err(place.clone().bad(what));
+        return Err(place.bad(what));
     }
     floats(asset, index, place)
 }

@@ -2,11 +2,10 @@
 
 use super::asset::Asset;
 use super::gloss::Gloss;
-use super::notes::Notes;
 use super::parts::{WEBP, name};
 use crate::channels;
 use crate::picture::{self, Samples};
-use crate::{LoadError, Place};
+use crate::{LoadError, LoadFault, Place};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::NormalTexture;
 use gltf::json::texture::{Info, MagFilter, Sampler, WrappingMode};
@@ -69,9 +68,8 @@ impl<'a> Textures<'a> {
         info: &Info,
         encoding: Encoding,
         place: &Place,
-        notes: &mut Notes,
     ) -> Result<ImageTexture, LoadError> {
-        let (_, mut texture) = self.texture(info, place, notes)?;
+        let (_, mut texture) = self.texture(info, place)?;
         if let (Encoding::Linear, Pixels::Srgb8(pixels)) = (encoding, &texture.pixels) {
             texture.pixels = Pixels::Linear8(pixels.clone());
         }
@@ -80,8 +78,7 @@ impl<'a> Textures<'a> {
 
     /// Alpha of a texture, if it is not opaque all over.
     pub(super) fn opacity(&mut self, info: &Info, place: &Place) -> Result<Option<ImageTexture>, LoadError> {
-        // What it has to say of extensions has been said for the colours
-        let (image, mut texture) = self.texture(info, place, &mut Notes::default())?;
+        let (image, mut texture) = self.texture(info, place)?;
         let Some(alpha) = self.images.get(&image).and_then(|decoded| decoded.alpha.clone()) else {
             return Ok(None);
         };
@@ -99,13 +96,8 @@ impl<'a> Textures<'a> {
     }
 
     /// The red channel of a texture, as shares.
-    pub(super) fn red(
-        &mut self,
-        info: &Info,
-        place: &Place,
-        notes: &mut Notes,
-    ) -> Result<ImageTexture, LoadError> {
-        let (image, texture) = self.texture(info, place, notes)?;
+    pub(super) fn red(&mut self, info: &Info, place: &Place) -> Result<ImageTexture, LoadError> {
+        let (image, texture) = self.texture(info, place)?;
         let codes = self.images.get(&image).map(|decoded| decoded.colour.clone()).unwrap_or_default();
         self.count(codes.len(), place)?;
         Ok(ImageTexture { pixels: Pixels::Linear8(codes.iter().map(|[r, ..]| [*r; 3]).collect()), ..texture })
@@ -113,14 +105,8 @@ impl<'a> Textures<'a> {
 
     /// The square of a texture's green channel times a factor, which is α of its microfacets in all
     /// directions.
-    pub(super) fn alphas(
-        &mut self,
-        info: &Info,
-        factor: f32,
-        place: &Place,
-        notes: &mut Notes,
-    ) -> Result<Texture, LoadError> {
-        let image = self.colour(info, Encoding::Linear, place, notes)?;
+    pub(super) fn alphas(&mut self, info: &Info, factor: f32, place: &Place) -> Result<Texture, LoadError> {
+        let image = self.colour(info, Encoding::Linear, place)?;
         self.count(image.width * image.height, place)?;
         Ok(Texture::Image(channels::mapped(&image, |[_, green, _]| [(green * factor).powi(2); 3])))
     }
@@ -132,10 +118,9 @@ impl<'a> Textures<'a> {
         factor: Gloss,
         [diffuse, specular]: [Option<&Info>; 2],
         place: &Place,
-        notes: &mut Notes,
     ) -> Result<(Texture, Texture), LoadError> {
         let mut read = |info: Option<&Info>| match info {
-            Some(info) => self.texture(info, place, notes).map(Some),
+            Some(info) => self.texture(info, place).map(Some),
             None => Ok(None),
         };
         let (diffuse, specular) = (read(diffuse)?, read(specular)?);
@@ -177,19 +162,14 @@ impl<'a> Textures<'a> {
     }
 
     /// The texture with its colours taken for sRGB, and the index of its image.
-    fn texture(
-        &mut self,
-        info: &Info,
-        place: &Place,
-        notes: &mut Notes,
-    ) -> Result<(usize, ImageTexture), LoadError> {
+    fn texture(&mut self, info: &Info, place: &Place) -> Result<(usize, ImageTexture), LoadError> {
         let asset = self.asset;
         let texture = asset.get(info.index, "texture", place)?;
         let here = Place::part(asset.path, name("texture", info.index.value(), texture.name.as_deref()));
         let others = texture.extensions.iter().flat_map(|e| &e.others);
-        notes.extensions(&here, others.map(|(name, _)| name).filter(|name| *name != WEBP));
-        notes.extensions(place, info.extensions.iter().flat_map(|e| e.others.keys()));
-        let (source, Decoded { width, height, colour, .. }) = self.image_of(texture, &here, notes)?;
+        self.asset.leave_out(&here, others.map(|(name, _)| name).filter(|name| *name != WEBP));
+        self.asset.leave_out(place, info.extensions.iter().flat_map(|e| e.others.keys()));
+        let (source, Decoded { width, height, colour, .. }) = self.image_of(texture, &here)?;
         let default = Sampler::default();
         let sampler = match texture.sampler {
             Some(sampler) => asset.get(sampler, "sampler", &here)?,
@@ -226,44 +206,40 @@ impl<'a> Textures<'a> {
         &mut self,
         texture: &gltf::json::Texture,
         place: &Place,
-        notes: &mut Notes,
     ) -> Result<(usize, Decoded), LoadError> {
         let sources = sources(texture);
         if let (true, Some(extensions)) = (is_foreign(texture), &texture.extensions) {
             let names: Vec<&str> = extensions.others.keys().map(String::as_str).collect();
-            return Err(place.clone().unsupported(format_args!("an image of only {}", names.join(", "))));
+            return Err(place.unsupported(format_args!("an image of only {}", names.join(", "))));
         }
         let mut missing = None;
         for source in sources {
-            match self.decoded(source, place, notes) {
-                Err(error @ LoadError::Read { .. }) => missing = missing.or(Some(error)),
+            match self.decoded(source, place) {
+                Err(error @ LoadError { fault: LoadFault::Read(_), .. }) => missing = missing.or(Some(error)),
                 decoded => return Ok((source.value(), decoded?)),
             }
         }
         if let Some(error) = missing {
             return Err(error);
         }
-        notes.warn(place, "it names no image: it is white");
+        self.asset.load.ignored(place, "it names no image: it is white");
         let white = Decoded { width: 1, height: 1, colour: Arc::new([[255; 3]]), alpha: None };
         Ok((NO_IMAGE, self.images.entry(NO_IMAGE).or_insert(white).clone()))
     }
 
-    fn decoded(
-        &mut self,
-        index: Index<Image>,
-        place: &Place,
-        notes: &mut Notes,
-    ) -> Result<Decoded, LoadError> {
+    fn decoded(&mut self, index: Index<Image>, place: &Place) -> Result<Decoded, LoadError> {
         if let Some(decoded) = self.images.get(&index.value()) {
             return Ok(decoded.clone());
         }
         let image = self.asset.get(index, "image", place)?;
         let here = Place::part(self.asset.path, name("image", index.value(), image.name.as_deref()));
-        notes.extensions(&here, image.extensions.iter().flat_map(|e| e.others.keys()));
+        self.asset.leave_out(&here, image.extensions.iter().flat_map(|e| e.others.keys()));
         let picture = match (image.buffer_view, &image.uri) {
-            (Some(view), _) => picture::decode(self.asset.folder(), self.asset.view(view, &here)?, &here)?,
+            (Some(view), _) => {
+                picture::decode(&self.asset.load.folder, self.asset.view(view, &here)?, &here)?
+            }
             (None, Some(uri)) => {
-                picture::decode(self.asset.folder(), &self.asset.resolve(uri, &here)?, &here)?
+                picture::decode(&self.asset.load.folder, &self.asset.resolve(uri, &here)?, &here)?
             }
             (None, None) => return Err(here.bad("it has neither a `bufferView` nor a `uri`")),
         };
@@ -287,7 +263,7 @@ impl<'a> Textures<'a> {
     /// Counts pixels against [`MAX_PIXELS`].
     fn count(&mut self, pixels: usize, place: &Place) -> Result<(), LoadError> {
         self.pixels += pixels as u64;
-        place.clone().at_most("pixels of images in all", self.pixels, MAX_PIXELS)
+        place.at_most("pixels of images in all", self.pixels, MAX_PIXELS)
     }
 }
 
@@ -328,7 +304,7 @@ fn wrap(mode: Checked<WrappingMode>, place: &Place) -> Result<Wrap, LoadError> {
         Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
         Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::Mirror),
         Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::Clamp),
-        Checked::Invalid => Err(place.clone().bad("a wrapping mode of its sampler is not one of glTF's")),
+        Checked::Invalid => Err(place.bad("a wrapping mode of its sampler is not one of glTF's")),
     }
 }
 

@@ -6,20 +6,19 @@ use crate::{LoadError, Place};
 /// Reads what `uri` names: the data in it, or a file in the folder of the scene. At most `limit` bytes.
 pub(super) fn read(uri: &str, folder: &Folder, place: &Place, limit: u64) -> Result<Vec<u8>, LoadError> {
     if let Some(data) = uri.strip_prefix("data:") {
-        let (kind, data) = data
-            .split_once(',')
-            .ok_or_else(|| place.clone().bad("a data URI has a comma before its data"))?;
+        let (kind, data) =
+            data.split_once(',').ok_or_else(|| place.bad("a data URI has a comma before its data"))?;
         if !kind.ends_with(";base64") {
-            return Err(place.clone().unsupported("a data URI that is not base64"));
+            return Err(place.unsupported("a data URI that is not base64"));
         }
-        place.clone().at_most("bytes of data", data.len() as u64 / 4 * 3, limit)?;
-        return base64(data.as_bytes()).ok_or_else(|| place.clone().bad("its data URI is not base64"));
+        place.at_most("bytes of data", data.len() as u64 / 4 * 3, limit)?;
+        return base64(data.as_bytes()).ok_or_else(|| place.bad("its data URI is not base64"));
     }
     // A colon before any slash ends the name of a scheme
     if let Some((scheme, _)) = uri.split_once(':').filter(|(scheme, _)| !scheme.contains('/')) {
-        return Err(place.clone().unsupported(format_args!("a URI of the scheme {scheme:?}")));
+        return Err(place.unsupported(format_args!("a URI of the scheme {scheme:?}")));
     }
-    let name = percent_decoded(uri).ok_or_else(|| place.clone().bad(format_args!("{uri:?} is not a URI")))?;
+    let name = percent_decoded(uri).ok_or_else(|| place.bad(format_args!("{uri:?} is not a URI")))?;
     folder.read(&folder.find(&name, place)?, limit, place)
 }
 

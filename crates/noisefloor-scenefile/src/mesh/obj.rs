@@ -26,8 +26,8 @@ const IRRELEVANT: [&str; 7] = ["g", "o", "s", "mg", "usemtl", "mtllib", "call"];
 /// vertex. Where some corners have no normal or texture coordinates, these are 0.
 ///
 /// # Errors
-/// [`LoadError::Bad`] if a number or an index is, or if there are no faces.
-/// [`LoadError::TooLarge`] as of [`Cutter::cut`].
+/// [`LoadFault::Bad`] if a number or an index is, or if there are no faces.
+/// [`LoadFault::TooLarge`] as of [`Cutter::cut`].
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     let text = files::text(bytes);
     let mut reader = Reader {
@@ -90,7 +90,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn bad(&self, what: String) -> LoadError {
-        Place::part(self.path, format_args!("line {}", self.line)).bad(what)
+        Place::line(self.path, self.line).bad(what)
     }
 
     fn line(&mut self, line: &str) -> Result<(), LoadError> {
@@ -158,7 +158,7 @@ impl Reader<'_> {
             return Ok(());
         }
         let corners: Vec<_> = self.polygon.iter().map(|i| self.mesh.positions[*i as usize]).collect();
-        let place = Place::part(self.path, format_args!("line {}", self.line));
+        let place = Place::line(self.path, self.line);
         let triangles = self.cutter.cut(&corners, &place)?;
         self.mesh.indices.extend(triangles.iter().map(|triangle| triangle.map(|i| self.polygon[i])));
         Ok(())

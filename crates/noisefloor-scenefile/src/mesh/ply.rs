@@ -19,8 +19,8 @@ const MAX_WORD: usize = 40;
 /// Reads the PLY file `bytes`, which came from `path`.
 ///
 /// # Errors
-/// [`LoadError::Bad`] if the file is cut short or corrupt, its header asks for more than the file holds, or
-/// it has no faces although its header does not say so. [`LoadError::TooLarge`] as of [`Cutter::cut`].
+/// [`LoadFault::Bad`] if the file is cut short or corrupt, its header asks for more than the file holds, or
+/// it has no faces although its header does not say so. [`LoadFault::TooLarge`] as of [`Cutter::cut`].
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Triangles, LoadError> {
     parse_with(bytes, path, None)
 }
@@ -305,7 +305,7 @@ impl Header {
         let mut wide = None;
         loop {
             number += 1;
-            let here = Place::part(path, format_args!("line {number}"));
+            let here = Place::line(path, number);
             let rest = &bytes[at..];
             let Some(end) = rest.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
                 return Err(here.bad("the PLY file is broken: its header does not end"));
@@ -318,7 +318,7 @@ impl Header {
                 return Err(here.bad("the PLY file is broken: its first line is not `ply`"));
             }
             let scalar = |name: &str| {
-                let unknown = || here.clone().bad(format_args!("`{}` is no type of a PLY file", cut(name)));
+                let unknown = || here.bad(format_args!("`{}` is no type of a PLY file", cut(name)));
                 Scalar::named(name).ok_or_else(unknown)
             };
             match (words.as_slice(), elements.last_mut()) {
@@ -328,9 +328,10 @@ impl Header {
                 (["format", "binary_little_endian", "1.0" | "1"], _) => format = Some(Format::LittleEndian),
                 (["format", "binary_big_endian", "1.0" | "1"], _) => format = Some(Format::BigEndian),
                 (["element", name, count], _) => {
-                    let count = count.parse().ok().ok_or_else(|| {
-                        here.clone().bad(format_args!("`{}` is no number of elements", cut(count)))
-                    })?;
+                    let count = count
+                        .parse()
+                        .ok()
+                        .ok_or_else(|| here.bad(format_args!("`{}` is no number of elements", cut(count))))?;
                     elements.push(Element { name: (*name).to_owned(), count, properties: vec![] });
                     here.at_most("elements", elements.len() as u64, MAX_ELEMENTS)?;
                 }
@@ -426,7 +427,7 @@ impl Body<'_> {
             return Place::file(self.path).bad(what);
         }
         let line = 1 + self.bytes[..self.at].iter().filter(|b| **b == b'\n').count();
-        Place::part(self.path, format_args!("line {line}")).bad(what)
+        Place::line(self.path, line).bad(what)
     }
 }
 

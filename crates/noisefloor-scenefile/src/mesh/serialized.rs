@@ -36,7 +36,7 @@ pub(crate) fn parse(
     path: &Path,
 ) -> Result<(Triangles, bool), LoadError> {
     let place = Place::part(path, format_args!("mesh {index}"));
-    let bad = |what: &str| place.clone().bad(what);
+    let bad = |what: &str| place.bad(what);
     let version = version(bytes, &place)?;
 
     // The table at the end: where each mesh starts, then how many there are
@@ -46,7 +46,7 @@ pub(crate) fn parse(
     let table = count.checked_mul(entry).and_then(|size| end.checked_sub(size));
     let table = table.ok_or_else(|| bad("the file is cut short: it has no table of its meshes"))?;
     if index >= count {
-        return Err(place.clone().bad(format!("there are only {count} meshes in the file, numbered from 0")));
+        return Err(place.bad(format!("there are only {count} meshes in the file, numbered from 0")));
     }
     let start = |index: usize| number(&bytes[table + index * entry..][..entry]);
     let next = if index + 1 < count { start(index + 1) } else { table as u64 };
@@ -65,9 +65,9 @@ fn version(bytes: &[u8], place: &Place) -> Result<u16, LoadError> {
     match bytes {
         [a, b, c, d, ..] if u16::from_le_bytes([*a, *b]) == MAGIC => match u16::from_le_bytes([*c, *d]) {
             version @ (3 | 4) => Ok(version),
-            other => Err(place.clone().unsupported(format!("version {other} of serialized meshes"))),
+            other => Err(place.unsupported(format!("version {other} of serialized meshes"))),
         },
-        _ => Err(place.clone().bad("this is not a serialized mesh of Mitsuba")),
+        _ => Err(place.bad("this is not a serialized mesh of Mitsuba")),
     }
 }
 
@@ -93,13 +93,13 @@ impl Inflated<'_> {
             // Early files do not say: they are single
             SINGLE | 0 => 4,
             DOUBLE => 8,
-            _ => return Err(self.place.clone().bad("its numbers are both single and double")),
+            _ => return Err(self.place.bad("its numbers are both single and double")),
         };
         if version == 4 {
             let mut length = 0;
             while self.bytes(1)? != [0] {
                 length += 1;
-                self.place.clone().at_most("bytes in a name", length, MAX_NAME as u64)?;
+                self.place.at_most("bytes in a name", length, MAX_NAME as u64)?;
             }
         }
         let (vertices, faces) = (number(&self.bytes(8)?), number(&self.bytes(8)?));
@@ -143,7 +143,7 @@ impl Inflated<'_> {
     }
 
     fn bytes(&mut self, count: u64) -> Result<Vec<u8>, LoadError> {
-        let bad = |what: String| self.place.clone().bad(what);
+        let bad = |what: String| self.place.bad(what);
         self.left = self.left.checked_sub(count).ok_or_else(|| {
             bad(format!(
                 "the mesh says it has {count} bytes more, which the file cannot hold or are too many"

@@ -1,8 +1,11 @@
 //! Curved and simple solids as triangles.
 
-use super::{Triangles, rows};
-use glam::{DMat4, DQuat, DVec2, DVec3, Vec3};
-use noisefloor_ptwne::{MaterialId, ObjectId, SceneBuilder, SceneError};
+use super::Triangles;
+use crate::error::{LoadError, Place};
+use crate::load::Load;
+use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, Vec3};
+use noisefloor_ptwne::{MaterialId, ObjectId, SceneBuilder};
+use std::collections::HashMap;
 use std::f32::consts::{PI, TAU};
 
 /// Triangles around a circle, and from pole to pole of a sphere.
@@ -49,24 +52,56 @@ pub(crate) fn sphere() -> Triangles {
     })
 }
 
-/// Adds the sphere of radius 1 around the origin, moved, as an instance of `shared` or of a new object, which is
-/// returned. Its texture coordinates run as pbrt's and Mitsuba's: u around z from +x over +y, v = 1 at +z.
-pub(crate) fn ellipsoid(
-    builder: &mut SceneBuilder,
-    shared: Option<ObjectId>,
-    material: MaterialId,
-    to_world: DMat4,
-) -> Result<ObjectId, SceneError> {
-    let object = match shared {
-        Some(object) => object,
-        None => {
-            builder.begin_object()?;
-            let axes = [-Vec3::X, Vec3::Z, -Vec3::Y].map(|axis| axis.to_array());
-            builder.turned_sphere([0.0; 3], 1.0, axes, material, None)?;
-            builder.end_object()?
-        }
-    };
-    builder.instance(object, rows(to_world)).map(|()| object)
+/// Spheres of radius 1 around the origin that the ellipsoids of a material share.
+#[derive(Debug, Default)]
+pub(crate) struct Balls(HashMap<MaterialId, ObjectId>);
+
+impl Balls {
+    /// Adds such a sphere, moved; one that is singular is left out, with a warning.
+    pub(crate) fn add(
+        &mut self,
+        load: &Load,
+        builder: &mut SceneBuilder,
+        material: MaterialId,
+        to_world: DMat4,
+        place: &Place,
+    ) -> Result<(), LoadError> {
+        let object = match self.0.get(&material) {
+            Some(object) => *object,
+            None => {
+                let refused = place.refused();
+                builder.begin_object().map_err(&refused)?;
+                let axes = [-Vec3::X, Vec3::Z, -Vec3::Y].map(|axis| axis.to_array());
+                builder.turned_sphere([0.0; 3], 1.0, axes, material, None).map_err(&refused)?;
+                let object = builder.end_object().map_err(&refused)?;
+                self.0.insert(material, object);
+                object
+            }
+        };
+        load.instance(builder, object, to_world, "a sphere", place).map(drop)
+    }
+}
+
+/// A sphere as the renderer takes it: with axes of its texture coordinates, which run as pbrt's and Mitsuba's: u around z
+/// from +x over +y, v = 1 at +z.
+#[derive(Debug)]
+pub(crate) struct Ball {
+    pub(crate) centre: [f32; 3],
+    pub(crate) radius: f32,
+    pub(crate) axes: [[f32; 3]; 3],
+}
+
+/// A sphere around `centre`, moved; none if that stretches or shears it.
+pub(crate) fn ball(to_world: DMat4, centre: DVec3, radius: f64) -> Option<Ball> {
+    let axes = DMat3::from_mat4(to_world);
+    let scale = axes.x_axis.length();
+    // To what six digits in a file leave of a rotation
+    let off = (axes.transpose() * axes - DMat3::IDENTITY * (scale * scale)).to_cols_array();
+    let even = off.iter().all(|x| x.abs() <= 1e-4 * scale * scale) && scale > 0.0;
+    let centre = to_world.transform_point3(centre).as_vec3().to_array();
+    let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| (axis / scale).as_vec3());
+    let axes = [-x, z, -y].map(|axis| axis.to_array());
+    even.then_some(Ball { centre, radius: (radius * scale) as f32, axes })
 }
 
 /// The open cylinder of radius 1 around z, from z = 0 to z = 1. u runs around z from +x over +y, v along z.

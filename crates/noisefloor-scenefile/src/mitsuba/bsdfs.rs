@@ -286,13 +286,6 @@ impl<'d> Context<'d> {
         let (eta, k) = match (given, self.string(element, "material")?) {
             // Given and named, the numbers count
             ([Some(eta), Some(k)], _) => (eta, k),
-            ([None, None], Some("none")) => match reflectance {
-                Texture::Colour(reflectance) if !rough => {
-                    return Ok(surface(Material::Mirror { reflectance }));
-                }
-                // Reflects all light at all angles
-                _ => ([0.0; 3], [1.0; 3]),
-            },
             ([None, None], name) => {
                 // Mitsuba 0.6 took copper where nothing was said, Mitsuba 3 a perfect mirror
                 let missing = if self.document.old { "Cu" } else { "none" };
@@ -301,6 +294,7 @@ impl<'d> Context<'d> {
                     ("none", Texture::Colour(reflectance)) if !rough => {
                         return Ok(surface(Material::Mirror { reflectance: *reflectance }));
                     }
+                    // Reflects all light at all angles
                     ("none", _) => ([0.0; 3], [1.0; 3]),
                     _ => indices::conductor(name).ok_or_else(|| {
                         let known: Vec<&str> = indices::CONDUCTORS.iter().map(|metal| metal.0).collect();
@@ -380,12 +374,12 @@ impl<'d> Context<'d> {
         element: &Element,
         [u, v]: [&Texture; 2],
     ) -> Result<(f32, Option<Texture>), LoadError> {
-        let alphas = self.joined(element, [u, v], |[u, v]| [u, v, 0.0])?;
+        let alphas = self.load.joined(&self.place(element), [u, v], |[u, v]| [u, v, 0.0])?;
         Ok(match alphas {
             Texture::Colour([u, v, _]) if u == v => (u, None),
             Texture::Colour([u, v, _]) => ((u * v).sqrt(), Some(alphas)),
             other => {
-                let [u, v, _] = self.means.of(&other);
+                let [u, v, _] = self.load.means.of(&other);
                 ((u * v).sqrt(), Some(other))
             }
         })
@@ -508,7 +502,9 @@ impl<'d> Context<'d> {
             (self.grey(element, "roughness", 0.5)?, self.grey(element, "metallic", 0.0)?);
         let surface = Principled {
             base: base.clone(),
-            metallic_roughness: self.joined(element, [&roughness, &metal], |[r, m]| [1.0, r, m])?,
+            metallic_roughness: self
+                .load
+                .joined(&self.place(element), [&roughness, &metal], |[r, m]| [1.0, r, m])?,
             ior: ior.clamp(1.0, 4.0),
             anisotropic: number("anisotropic", 0.0)? as f32,
             specular_tint: number("spec_tint", 0.0)? as f32,
@@ -557,19 +553,19 @@ impl<'d> Context<'d> {
         if matches!(surface.base, Texture::Image(_)) {
             self.approximated(element, "the tint of transmitted light is the mean of `base_color`");
         }
-        let tint = self.means.of(&surface.base).map(f32::sqrt);
-        let metallic = self.means.of(metal)[0];
+        let tint = self.load.means.of(&surface.base).map(f32::sqrt);
+        let metallic = self.load.means.of(metal)[0];
         let share = (1.0 - metallic) * share as f32;
         let aspect = (1.0 - 0.9 * surface.anisotropic).sqrt();
         let square = |r: f32| [r * r / aspect, r * r * aspect, 0.0];
-        let alphas = self.joined(element, [roughness], |[r]| square(r))?;
+        let alphas = self.load.joined(&self.place(element), [roughness], |[r]| square(r))?;
         let glass = match alphas {
             _ if thin => Surface::two_sided(Material::ThinGlass { ior, tint }),
             Texture::Colour([u, v, _]) if u == v => {
                 Surface::two_sided(Material::RoughGlass { ior, tint, roughness: u })
             }
             alphas => {
-                let body = Material::RoughGlass { ior, tint, roughness: self.means.of(&alphas)[0] };
+                let body = Material::RoughGlass { ior, tint, roughness: self.load.means.of(&alphas)[0] };
                 Surface { alphas: Some(alphas), ..Surface::two_sided(body) }
             }
         };
@@ -577,7 +573,7 @@ impl<'d> Context<'d> {
             return Ok(glass);
         }
         let rest = metallic / (1.0 - share);
-        let metallic_roughness = self.joined(element, [roughness], |[r]| [1.0, r, rest])?;
+        let metallic_roughness = self.load.joined(&self.place(element), [roughness], |[r]| [1.0, r, rest])?;
         let surface = Surface::one_sided(Principled { metallic_roughness, ..surface }.into());
         Ok(Surface::blend(surface, glass, Texture::Colour([share; 3])))
     }

@@ -135,8 +135,8 @@ impl<'d> Context<'d> {
     /// Lines of wavelength and value; `#` begins a comment.
     fn spectrum_file(&self, element: &Element, name: &str) -> Result<Vec<(f64, f64)>, LoadError> {
         let place = self.place(element);
-        let path = self.document.folder.find(name, &place)?;
-        let bytes = self.document.folder.read(&path, MAX_FILE_BYTES, &place)?;
+        let path = self.load.folder.find(name, &place)?;
+        let bytes = self.load.folder.read(&path, MAX_FILE_BYTES, &place)?;
         let text = files::text(&bytes);
         let lines = files::lines(&text).map(|line| line.split('#').next().unwrap_or_default().trim());
         let mut samples = Vec::new();
@@ -149,7 +149,7 @@ impl<'d> Context<'d> {
                     );
                 }
             }
-            place.clone().at_most("samples of a spectrum", samples.len() as u64, MAX_SAMPLES as u64)?;
+            place.at_most("samples of a spectrum", samples.len() as u64, MAX_SAMPLES as u64)?;
         }
         Ok(samples)
     }

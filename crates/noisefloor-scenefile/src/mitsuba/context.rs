@@ -4,18 +4,16 @@
 use super::document::{Document, unset};
 use super::parts::{Attribute, Raster, Surface};
 use super::xml::Element;
-use crate::bounds::Bounds;
-use crate::channels::Means;
-use crate::error::{LoadError, Place, Warning};
+use crate::error::{LoadError, Place};
+use crate::load::Load;
 use crate::options::{LoadOptions, NO_MEDIA};
 use glam::{DMat3, DMat4, DVec3};
 use noisefloor_ptwne::{Facets, Material, SceneError, Texture};
-use std::cell::{Cell, RefCell};
-use std::collections::{HashMap, HashSet};
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;
 
-const MAX_WARNINGS: usize = 10_000;
 /// Kinds of elements that Mitsuba 3.9 has and this reader has not.
 const MITSUBAS_OWN: [(&str, &str); 17] = [
     ("bsdf", "circular"),
@@ -38,14 +36,12 @@ const MITSUBAS_OWN: [(&str, &str); 17] = [
 ];
 /// Most aliases in a row.
 const MAX_ALIASES: usize = 16;
-/// Most pixels that the pictures of a scene have together, where they are kept more than once counted as
-/// often.
-const MAX_PIXELS: u64 = 1 << 27;
 
 /// A scene file that is being read.
 #[derive(Debug)]
 pub(super) struct Context<'d> {
     pub(super) document: &'d Document,
+    pub(super) load: &'d Load,
     pub(super) options: &'d LoadOptions,
     /// Pictures that have been read, by file and whether their codes are linear.
     pub(super) rasters: RefCell<HashMap<(PathBuf, bool), Raster>>,
@@ -55,33 +51,22 @@ pub(super) struct Context<'d> {
     pub(super) textures: RefCell<HashMap<(usize, bool), (f32, Texture)>>,
     /// The attributes of meshes that surfaces use, by the serial number of their element.
     pub(super) attributes: RefCell<HashMap<usize, Option<Attribute>>>,
-    pub(super) means: Means,
-    /// Of surfaces, textures and shapes, one in another.
-    bounds: Bounds,
-    pixels: Cell<u64>,
     identified: HashMap<&'d str, &'d Element>,
     aliases: HashMap<&'d str, &'d str>,
-    warnings: RefCell<Vec<Warning>>,
-    /// Warnings that there are already.
-    said: RefCell<HashSet<(usize, String)>>,
 }
 
 impl<'d> Context<'d> {
     pub(super) fn new(document: &'d Document, options: &'d LoadOptions) -> Result<Self, LoadError> {
         let context = Self {
             document,
+            load: &document.load,
             options,
             rasters: RefCell::default(),
             surfaces: RefCell::default(),
             textures: RefCell::default(),
             attributes: RefCell::default(),
-            means: Means::default(),
-            bounds: Bounds::default(),
-            pixels: Cell::new(0),
             identified: HashMap::new(),
             aliases: HashMap::new(),
-            warnings: RefCell::default(),
-            said: RefCell::default(),
         };
         let (mut found, mut identified) = (Vec::new(), HashMap::new());
         document.root.identified(&mut found);
@@ -123,45 +108,23 @@ impl<'d> Context<'d> {
     }
 
     /// The error that the renderer does not take what `element` asks for.
-    pub(super) fn refused(&self, element: &Element) -> impl Fn(SceneError) -> LoadError {
-        let place = self.place(element);
-        move |cause| LoadError::Scene { place: place.clone(), cause }
+    pub(super) fn refused(&self, element: &Element) -> impl Fn(SceneError) -> LoadError + use<> {
+        self.place(element).refused()
     }
 
     /// Warns, once, that something is left out.
     pub(super) fn ignored(&self, element: &Element, what: impl fmt::Display) {
-        self.warn(element, Warning::ignored(self.place(element), what));
+        self.load.ignored(&self.place(element), what);
     }
 
     /// Warns, once, that something is replaced by something that looks much the same.
     pub(super) fn approximated(&self, element: &Element, what: impl fmt::Display) {
-        self.warn(element, Warning::approximated(self.place(element), what));
+        self.load.approximated(&self.place(element), what);
     }
 
-    fn warn(&self, element: &Element, warning: Warning) {
-        let mut warnings = self.warnings.borrow_mut();
-        if warnings.len() > MAX_WARNINGS
-            || !self.said.borrow_mut().insert((element.serial, warning.what.clone()))
-        {
-            return;
-        }
-        if warnings.len() < MAX_WARNINGS {
-            warnings.push(warning);
-        } else {
-            let place = Place::file(self.document.path());
-            warnings.push(Warning::ignored(place, "further warnings are left out"));
-        }
-    }
-
-    /// All warnings, in the order in which they came up.
-    pub(super) fn into_warnings(self) -> Vec<Warning> {
-        self.warnings.into_inner()
-    }
-
-    /// Counts pixels that are kept, and refuses more than [`MAX_PIXELS`].
+    /// Counts pixels that are kept, and refuses too many.
     pub(super) fn count_pixels(&self, element: &Element, count: usize) -> Result<(), LoadError> {
-        self.pixels.set(self.pixels.get().saturating_add(count as u64));
-        self.place(element).at_most("pixels in all pictures so far", self.pixels.get(), MAX_PIXELS)
+        self.load.count_pixels(&self.place(element), count)
     }
 
     /// The element itself, or, if it is a `ref`, what it refers to.
@@ -198,9 +161,9 @@ impl<'d> Context<'d> {
         element: &'d Element,
         read: impl FnOnce() -> Result<T, LoadError>,
     ) -> Result<T, LoadError> {
-        self.bounds.begin(element.serial, element.label(), &self.place(element))?;
+        self.load.bounds.begin(element.serial, element.label(), &self.place(element))?;
         let result = read();
-        self.bounds.end();
+        self.load.bounds.end();
         result
     }
 
@@ -211,12 +174,12 @@ impl<'d> Context<'d> {
         material: &Material,
         facets: (bool, Facets),
     ) -> Result<(), LoadError> {
-        self.bounds.coat(material, facets, &self.place(element))
+        self.load.bounds.coat(material, facets, &self.place(element))
     }
 
     /// Counts work that is done for `element`.
     pub(super) fn spend(&self, element: &Element, work: usize) -> Result<(), LoadError> {
-        self.bounds.spend(work, &self.place(element))
+        self.load.bounds.spend(work, &self.place(element))
     }
 
     /// Refuses the participating media in `object`, or warns that they are left out.

@@ -3,7 +3,8 @@
 use super::markup::{Start, Tag, Tags};
 use super::xml::{Attribute, Element, Origin};
 use crate::error::{LoadError, Place};
-use crate::files::{self, Folder};
+use crate::files;
+use crate::load::Load;
 use crate::options::LoadOptions;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -26,8 +27,7 @@ pub(super) struct Document {
     /// The first number of its version is below 2.
     pub(super) old: bool,
     pub(super) root: Element,
-    /// Where the files are that it names.
-    pub(super) folder: Folder,
+    pub(super) load: Load,
 }
 
 impl Document {
@@ -39,7 +39,7 @@ impl Document {
     pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Self, LoadError> {
         let mut builder = Builder {
             files: vec![],
-            folder: Folder::of(path, options.root.as_deref(), options.identity()),
+            load: Load::new(path, options.root.as_deref(), options.identity()),
             parameters: options.parameters.clone().into_iter().collect(),
             bytes: 0,
             added: 0,
@@ -49,15 +49,11 @@ impl Document {
         if root.tag != "scene" {
             return Err(not_a_scene(path));
         }
-        Ok(Self { files: builder.files, old, root, folder: builder.folder })
+        Ok(Self { files: builder.files, old, root, load: builder.load })
     }
 
     pub(super) fn place(&self, element: &Element) -> Place {
-        Place::part(&self.files[element.origin.file], format_args!("line {}", element.origin.line))
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        &self.files[0]
+        Place::line(&self.files[element.origin.file], element.origin.line)
     }
 }
 
@@ -68,7 +64,7 @@ fn not_a_scene(path: &Path) -> LoadError {
 /// Builds the tree file by file.
 struct Builder {
     files: Vec<PathBuf>,
-    folder: Folder,
+    load: Load,
     /// Given by the caller, or by `default` elements so far. The first value of a name stays.
     parameters: HashMap<String, String>,
     /// Bytes read so far.
@@ -88,8 +84,8 @@ struct Source<'a> {
 impl Builder {
     /// The root element of the file in `path`, which `place` names, and whether its version is below 2.
     fn file(&mut self, path: &Path, place: &Place, depth: u32) -> Result<(bool, Element), LoadError> {
-        place.clone().at_most("files", self.files.len() as u64 + 1, MAX_FILES)?;
-        let bytes = self.folder.read(path, MAX_XML_BYTES - self.bytes, place)?;
+        place.at_most("files", self.files.len() as u64 + 1, MAX_FILES)?;
+        let bytes = self.load.folder.read(path, MAX_XML_BYTES - self.bytes, place)?;
         self.bytes += bytes.len() as u64;
         let text = text(&bytes);
         let mut tags = Tags::new(&text, path);
@@ -127,10 +123,10 @@ impl Builder {
         depth: u32,
     ) -> Result<Element, LoadError> {
         let origin = Origin { file: source.file, line: start.line };
-        let place = Place::part(source.path, format_args!("line {}", origin.line));
-        place.clone().at_most("levels of elements", u64::from(depth), u64::from(MAX_DEPTH))?;
+        let place = Place::line(source.path, origin.line);
+        place.at_most("levels of elements", u64::from(depth), u64::from(MAX_DEPTH))?;
         self.elements += 1;
-        place.clone().at_most("elements", self.elements as u64, MAX_ELEMENTS)?;
+        place.at_most("elements", self.elements as u64, MAX_ELEMENTS)?;
         let mut element = Element::new(start.name.clone(), origin, self.elements - 1);
         for (name, value) in &start.attributes {
             let (mut value, unset) = self.substitute(value, &place)?;
@@ -171,9 +167,9 @@ impl Builder {
     fn default(&mut self, element: &Element, name: Option<&str>, place: &Place) -> Result<(), LoadError> {
         element.irrelevant();
         let (Some(name), Some(value)) = (name, element.attribute("value")) else {
-            return Err(place.clone().bad("a <default> needs a name and a value"));
+            return Err(place.bad("a <default> needs a name and a value"));
         };
-        place.clone().at_most("bytes in the name of a parameter", name.len() as u64, MAX_PARAMETER as u64)?;
+        place.at_most("bytes in the name of a parameter", name.len() as u64, MAX_PARAMETER as u64)?;
         if element.unset.is_none() {
             self.parameters.entry(name.to_owned()).or_insert_with(|| value.to_owned());
         }
@@ -183,8 +179,8 @@ impl Builder {
     /// Notes a folder in which to look for files.
     fn search_path(&mut self, element: &Element, place: &Place) -> Result<(), LoadError> {
         element.irrelevant();
-        let value = element.attribute("value").ok_or_else(|| place.clone().bad("a <path> needs a value"))?;
-        self.folder.search(value, place)
+        let value = element.attribute("value").ok_or_else(|| place.bad("a <path> needs a value"))?;
+        self.load.folder.search(value, place)
     }
 
     /// Adds what is in the file that `element` names to `children`.
@@ -195,13 +191,13 @@ impl Builder {
         children: &mut Vec<Element>,
         depth: u32,
     ) -> Result<(), LoadError> {
-        let place = Place::part(source.path, format_args!("line {}", element.origin.line));
+        let place = Place::line(source.path, element.origin.line);
         if let Some(name) = &element.unset {
             return Err(place.bad(unset(name)));
         }
         let name = element.attribute("filename");
-        let name = name.ok_or_else(|| place.clone().bad("an <include> needs a `filename`"))?;
-        let path = self.folder.find(name, &place)?;
+        let name = name.ok_or_else(|| place.bad("an <include> needs a `filename`"))?;
+        let path = self.load.folder.find(name, &place)?;
         let (_, root) = self.file(&path, &place, depth)?;
         if root.tag == "scene" {
             children.extend(root.children);
@@ -229,7 +225,7 @@ impl Builder {
                 continue;
             };
             self.added += value.len() as u64;
-            place.clone().at_most("bytes in parameters", self.added, MAX_XML_BYTES)?;
+            place.at_most("bytes in parameters", self.added, MAX_XML_BYTES)?;
             result += value;
             result += &piece[end..];
         }

@@ -46,8 +46,7 @@ impl<'a> Tags<'a> {
 
     /// The XML is broken on the current line.
     pub(super) fn broken(&self, what: impl std::fmt::Display) -> LoadError {
-        Place::part(self.path, format_args!("line {}", self.line))
-            .bad(format_args!("the XML is broken: {what}"))
+        Place::line(self.path, self.line).bad(format_args!("the XML is broken: {what}"))
     }
 
     /// The next tag; none at the end of the file.
@@ -103,7 +102,7 @@ impl<'a> Tags<'a> {
             let length = self.rest[1..].find(quote).ok_or_else(ends)?;
             let value = unescaped(&self.rest[1..=length]);
             self.take(length + 2);
-            let place = Place::part(self.path, format_args!("line {line}"));
+            let place = Place::line(self.path, line);
             place.at_most("attributes of one element", attributes.len() as u64 + 1, MAX_ATTRIBUTES)?;
             if !attributes.iter().any(|(known, _)| *known == key) {
                 attributes.push((key, value));

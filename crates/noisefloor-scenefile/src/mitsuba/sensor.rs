@@ -3,7 +3,8 @@
 use super::context::Context;
 use super::xml::Element;
 use crate::error::LoadError;
-use glam::{DMat3, DVec3};
+use crate::loaded::{anywhere, camera};
+use glam::DMat3;
 use noisefloor_ptwne::{Camera, FovAxis, Optics};
 
 /// Mitsuba's image size where a scene gives none.
@@ -21,6 +22,7 @@ struct FilmSize {
     shown: (usize, usize),
 }
 
+/// By default of scenes that are only checked.
 pub(super) struct View {
     pub(super) camera: Camera,
     pub(super) optics: Optics,
@@ -28,12 +30,9 @@ pub(super) struct View {
     pub(super) size: Option<(usize, usize)>,
 }
 
-impl View {
-    /// A view of scenes that are only checked.
-    pub(super) fn any() -> Self {
-        let camera =
-            Camera { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0], vertical_fov: 45.0 };
-        Self { camera, optics: Optics::default(), size: None }
+impl Default for View {
+    fn default() -> Self {
+        Self { camera: anywhere(), optics: Optics::default(), size: None }
     }
 }
 
@@ -83,16 +82,8 @@ impl<'d> Context<'d> {
             sensor.ignore(&["focus_distance"]);
         }
 
-        let (eye, view) = (to_world.w_axis.truncate(), axes.z_axis.normalize_or_zero());
-        // Far from 0, a target close by would be rounded
-        let target = eye + view * eye.abs().max_element().max(1.0);
-        let array = |v: DVec3| v.as_vec3().to_array();
-        let up = array(axes.y_axis.normalize_or_zero());
-        Ok(View {
-            camera: Camera { eye: array(eye), target: array(target), up, vertical_fov },
-            optics,
-            size: size.map(|size| size.shown),
-        })
+        let size = size.map(|size| size.shown);
+        Ok(View { camera: camera(to_world, vertical_fov), optics, size })
     }
 
     /// The size of the picture, and which part of it is shown: shares of its width and height.

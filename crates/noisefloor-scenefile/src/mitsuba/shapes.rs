@@ -5,9 +5,10 @@ use super::parts::{Attribute, Body, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
 use crate::files::MAX_FILE_BYTES;
-use crate::mesh::{Triangles, normal_matrix, obj, ply, rows, serialized, solids};
+use crate::mesh::solids::{self, Ball, Balls};
+use crate::mesh::{Triangles, normal_matrix, obj, ply, serialized};
 use glam::{DMat3, DMat4, DQuat, DVec3};
-use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, ObjectId, SceneBuilder, SceneError};
+use noisefloor_ptwne::{Emission, Material, MaterialId, MaterialOptions, ObjectId, SceneBuilder};
 use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
@@ -37,7 +38,7 @@ impl<'d> Context<'d> {
     ) -> Result<(), LoadError> {
         self.spend(element, element.children.len())?;
         if instance.is_some() {
-            self.document.folder.build(1, &self.place(element))?;
+            self.load.folder.build(1, &self.place(element))?;
         }
         self.no_media(element)?;
         element.ignore(&["silhouette_sampling_weight"]);
@@ -47,10 +48,10 @@ impl<'d> Context<'d> {
             // As triangles if stretched, or if light depends on where on it or comes from its inside
             "sphere" => self
                 .sphere(element, instance)?
-                .filter(|sphere| emission.is_none() || !glows && !sphere.inside_out),
+                .filter(|(_, inside_out)| emission.is_none() || !glows && !inside_out),
             _ => None,
         };
-        let inside_out = round.as_ref().is_some_and(|sphere| sphere.inside_out);
+        let inside_out = round.as_ref().is_some_and(|(_, inside_out)| *inside_out);
         let (material, textured) = self.material(element, emission.is_some(), inside_out, filling)?;
         let mapped = textured || glows;
 
@@ -61,18 +62,10 @@ impl<'d> Context<'d> {
         match (element.kind(), round) {
             ("sphere", None) if plain => {
                 let to_world = self.transform(element, "to_world")? * self.own_sphere(element)?;
-                let shared = filling.balls.get(&material).copied();
-                match solids::ellipsoid(&mut filling.builder, shared, material, to_world) {
-                    Err(SceneError::Singular) => {
-                        self.ignored(element, "a sphere is left out: its transform is singular");
-                    }
-                    ball => {
-                        filling.balls.insert(material, ball.map_err(self.refused(element))?);
-                    }
-                }
-                Ok(())
+                let place = self.place(element);
+                filling.balls.add(self.load, &mut filling.builder, material, to_world, &place)
             }
-            ("sphere", Some(Sphere { centre, radius, axes, .. })) => {
+            ("sphere", Some((Ball { centre, radius, axes }, _))) => {
                 let added = if textured {
                     filling.builder.turned_sphere(centre, radius, axes, material, emission)
                 } else {
@@ -91,7 +84,7 @@ impl<'d> Context<'d> {
                     Some(mesh) => mesh,
                     None => Rc::new(self.triangles(element, mapped)?),
                 };
-                self.document.folder.build(mesh.indices.len() as u64, &self.place(element))?;
+                self.load.folder.build(mesh.indices.len() as u64, &self.place(element))?;
                 let Some(to_world) = instance else {
                     return self.add(element, &mesh, filling, material, emission);
                 };
@@ -224,8 +217,8 @@ impl<'d> Context<'d> {
         let name = self.string(element, "filename")?;
         let name =
             name.ok_or_else(|| self.bad(element, format!("{} needs a `filename`", element.species())))?;
-        let path = self.document.folder.find(name, &place)?;
-        let bytes = self.document.folder.read(&path, MAX_FILE_BYTES, &place)?;
+        let path = self.load.folder.find(name, &place)?;
+        let bytes = self.load.folder.read(&path, MAX_FILE_BYTES, &place)?;
         let attribute = self.attribute_of(element)?;
         let (mut mesh, flat) = match (element.kind(), &attribute) {
             ("ply", Some(attribute)) => (self.coloured(element, &bytes, &path, attribute)?, false),
@@ -239,7 +232,7 @@ impl<'d> Context<'d> {
                 let index = self.integer(element, "shape_index")?.unwrap_or(0);
                 let index =
                     usize::try_from(index).map_err(|_| self.bad(element, "`shape_index` is negative"))?;
-                serialized::parse(&self.document.folder, &bytes, index, &path)?
+                serialized::parse(&self.load.folder, &bytes, index, &path)?
             }
         };
         mesh.check(&Place::file(&path))?;
@@ -277,7 +270,7 @@ impl<'d> Context<'d> {
     fn disk(&self, element: &'d Element, instance: Option<DMat4>) -> Result<DiskFrame, LoadError> {
         let to_world = instance.unwrap_or_default() * self.transform(element, "to_world")?;
         let [e1, mut e2] = [to_world.x_axis, to_world.y_axis].map(|axis| axis.truncate());
-        let mut front = normal_matrix(to_world) * DVec3::Z;
+        let mut front = normal_matrix(DMat3::from_mat4(to_world)) * DVec3::Z;
         if self.boolean(element, "flip_normals", false)? {
             front = -front;
         }
@@ -289,27 +282,19 @@ impl<'d> Context<'d> {
         Ok((array(to_world.w_axis.truncate()), [array(e1), array(e2)], reversed))
     }
 
-    /// A sphere; none if it is stretched or sheared.
-    fn sphere(&self, element: &'d Element, instance: Option<DMat4>) -> Result<Option<Sphere>, LoadError> {
+    /// A sphere, and whether its front is inside; none if it is stretched or sheared.
+    fn sphere(
+        &self,
+        element: &'d Element,
+        instance: Option<DMat4>,
+    ) -> Result<Option<(Ball, bool)>, LoadError> {
         let to_world = instance.unwrap_or_default() * self.transform(element, "to_world")?;
         let own = self.own_sphere(element)?;
-        let axes = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate());
-        let scale = axes[0].length();
-        // To what six digits in a file leave of a rotation
-        let close = |a: f64, b: f64| (a - b).abs() <= 1e-4 * b.abs().max(scale * scale);
-        let even = axes.iter().all(|axis| close(axis.length_squared(), scale * scale))
-            && [(0, 1), (1, 2), (2, 0)].iter().all(|(a, b)| close(axes[*a].dot(axes[*b]), 0.0));
-        if !even {
-            return Ok(None);
-        }
-        let centre = to_world.transform_point3(own.w_axis.truncate()).as_vec3().to_array();
         // Mitsuba's mirrored spheres have their front inside
         let mirrored = DMat3::from_mat4(to_world).determinant() < 0.0;
         let inside_out = mirrored != self.boolean(element, "flip_normals", false)?;
-        // Mitsuba's pole is +z, and u runs from +x over +y
-        let [x, y, z] = axes.map(|axis| (axis / scale).as_vec3());
-        let axes = [-x, z, -y].map(|axis| axis.to_array());
-        Ok(Some(Sphere { centre, radius: (own.x_axis.x * scale) as f32, axes, inside_out }))
+        let ball = solids::ball(to_world, own.w_axis.truncate(), own.x_axis.x);
+        Ok(ball.map(|ball| (ball, inside_out)))
     }
 
     /// The sphere of radius 1 around the origin to that of the element's `center` and `radius`.
@@ -333,14 +318,6 @@ impl<'d> Context<'d> {
     }
 }
 
-struct Sphere {
-    centre: [f32; 3],
-    radius: f32,
-    /// The axes of its texture coordinates.
-    axes: [[f32; 3]; 3],
-    inside_out: bool,
-}
-
 // What shapes and groups fill.
 
 /// The scene that is being filled.
@@ -352,7 +329,7 @@ pub(super) struct Filling<'d> {
     /// Meshes of groups that shine, by the serial number of their element.
     pub(super) meshes: HashMap<usize, Rc<Triangles>>,
     /// Spheres that ellipsoids of a material share.
-    pub(super) balls: HashMap<MaterialId, ObjectId>,
+    pub(super) balls: Balls,
     /// Whether shapes are added to what the instances of a group share.
     pub(super) in_group: bool,
     /// Groups that have been shown, by the serial number of their element; none if one cannot be.
@@ -397,12 +374,9 @@ impl<'d> Context<'d> {
         let Some(Some(Group { shared, shining })) = filling.groups.get(&group.serial).cloned() else {
             return Ok(());
         };
-        match filling.builder.instance(shared, rows(to_world)) {
-            Err(SceneError::Singular) => {
-                self.ignored(element, "an instance is left out: its transform is singular");
-                return Ok(());
-            }
-            shown => shown.map_err(self.refused(element))?,
+        let place = self.place(element);
+        if !self.load.instance(&mut filling.builder, shared, to_world, "an instance", &place)? {
+            return Ok(());
         }
         shining.iter().try_for_each(|shape| self.simple(shape, Some(to_world), filling))
     }

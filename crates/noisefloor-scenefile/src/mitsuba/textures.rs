@@ -3,13 +3,11 @@
 use super::context::Context;
 use super::parts::Raster;
 use super::xml::Element;
-use crate::channels;
 pub(super) use crate::channels::linear;
 use crate::colour::Quantity;
 use crate::error::LoadError;
-use crate::picture::{self, Picture, Samples};
+use crate::picture::{self, Picture};
 use noisefloor::Rgb;
-use noisefloor::display::srgb_decode;
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
 use std::sync::Arc;
 
@@ -54,7 +52,7 @@ impl<'d> Context<'d> {
         self.approximated(texture, format!("the texture of `{name}` is replaced by its mean"));
         let (scale, image) = self.image(texture, quantity)?;
         let image = self.varying(texture, image)?;
-        Ok(self.means.of(&image).map(|c| c * scale))
+        Ok(self.load.means.of(&image).map(|c| c * scale))
     }
 
     /// The light called `name`, 1 if there is none, and what multiplies it over the surface.
@@ -290,47 +288,17 @@ impl<'d> Context<'d> {
         })
     }
 
-    /// Grey textures as one, whose pixels `put` makes of their values.
-    pub(super) fn joined<const N: usize>(
-        &self,
-        element: &Element,
-        parts: [&Texture; N],
-        put: impl Fn([f32; N]) -> Rgb,
-    ) -> Result<Texture, LoadError> {
-        let (texture, replaced) = channels::joined(parts, |texture| self.means.of(texture), put);
-        if replaced {
-            self.approximated(element, "a second texture of another layout is replaced by its mean");
-        }
-        if let Texture::Image(image) = &texture {
-            self.count_pixels(element, image.width * image.height)?;
-        }
-        Ok(texture)
-    }
-
     /// The picture called `name`. Codes of 8 and 16 bits are sRGB-encoded unless `raw`.
     pub(super) fn raster(&self, element: &Element, name: &str, raw: bool) -> Result<Raster, LoadError> {
         let place = &self.place(element);
-        let path = self.document.folder.find(name, place)?;
+        let path = self.load.folder.find(name, place)?;
         let key = (path, raw);
         if let Some(found) = self.rasters.borrow().get(&key) {
             return Ok(found.clone());
         }
-        let Picture { width, height, samples } = picture::read(&self.document.folder, &key.0, place)?;
+        let Picture { width, height, samples } = picture::read(&self.load.folder, &key.0, place)?;
         self.count_pixels(element, width * height)?;
-        let pixels = match samples {
-            Samples::Eight(codes) if raw => {
-                Pixels::Linear8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect())
-            }
-            Samples::Eight(codes) => Pixels::Srgb8(codes.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()),
-            Samples::Sixteen(codes) => {
-                let linear = |code: u16| {
-                    let value = f32::from(code) / 65535.0;
-                    if raw { value } else { srgb_decode(value) }
-                };
-                Pixels::Float(codes.iter().map(|[r, g, b, _]| [*r, *g, *b].map(linear)).collect())
-            }
-            Samples::Linear(values) => Pixels::Float(values.into()),
-        };
+        let pixels = samples.pixels(raw);
         let raster = Raster { width, height, pixels };
         self.rasters.borrow_mut().insert(key, raster.clone());
         Ok(raster)

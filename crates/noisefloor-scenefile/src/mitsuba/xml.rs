@@ -143,23 +143,16 @@ impl Element {
 
     /// How messages call it.
     pub(super) fn label(&self) -> String {
-        let mut label = format!("<{}", self.tag);
-        for key in ["type", "name", "id"] {
-            if let Some(value) = self.attribute(key) {
-                label += &format!(" {key}=\"{value}\"");
-            }
-        }
-        label + ">"
+        self.tag_with(&["type", "name", "id"])
     }
 
     /// How messages call it where its id does not matter.
     pub(super) fn species(&self) -> String {
-        let mut label = format!("<{}", self.tag);
-        for key in ["type", "name"] {
-            if let Some(value) = self.attribute(key) {
-                label += &format!(" {key}=\"{value}\"");
-            }
-        }
-        label + ">"
+        self.tag_with(&["type", "name"])
+    }
+
+    fn tag_with(&self, keys: &[&str]) -> String {
+        let values = keys.iter().filter_map(|key| Some(format!(" {key}=\"{}\"", self.attribute(key)?)));
+        format!("<{}{}>", self.tag, values.collect::<String>())
     }
 }

@@ -1,25 +1,23 @@
 //! What follows the name of a directive.
 
-use super::params::{self, Params, at, number};
+use super::params::{self, Params, number};
 use super::tokens::{Kind, Tokens};
 use crate::error::{LoadError, Place};
-use std::path::Path;
 
 /// The tokens behind a directive, and where it stands.
 pub(super) struct Arguments<'a, 't> {
     tokens: &'a mut Tokens<'t>,
-    path: &'a Path,
     line: u32,
     directive: &'a str,
 }
 
 impl<'a, 't> Arguments<'a, 't> {
-    pub(super) fn new(tokens: &'a mut Tokens<'t>, path: &'a Path, line: u32, directive: &'a str) -> Self {
-        Self { tokens, path, line, directive }
+    pub(super) fn new(tokens: &'a mut Tokens<'t>, line: u32, directive: &'a str) -> Self {
+        Self { tokens, line, directive }
     }
 
     pub(super) fn place(&self) -> Place {
-        at(self.path, self.line)
+        self.tokens.place(self.line)
     }
 
     /// A name in quotes.
@@ -30,18 +28,14 @@ impl<'a, 't> Arguments<'a, 't> {
 
     /// The next token, if it is a text in quotes, or nothing.
     fn skip(&mut self) -> Result<Option<String>, LoadError> {
-        let path = self.path;
-        let token = self.tokens.next().map_err(|line| unended(path, line))?;
+        let token = self.tokens.next()?;
         Ok(token.and_then(|token| if let Kind::Text(text) = token.kind { Some(text) } else { None }))
     }
 
     /// All names in quotes that come next, at least one.
     pub(super) fn texts(&mut self) -> Result<Vec<String>, LoadError> {
         let mut names = vec![self.text()?];
-        let path = self.path;
-        while let Some(Kind::Text(_)) =
-            self.tokens.peek().map_err(|line| unended(path, line))?.map(|token| &token.kind)
-        {
+        while let Some(Kind::Text(_)) = self.tokens.peek()?.map(|token| &token.kind) {
             names.push(self.text()?);
         }
         Ok(names)
@@ -54,16 +48,15 @@ impl<'a, 't> Arguments<'a, 't> {
 
     /// Passes over all up to the next directive, of which nothing is known but that it begins with a capital.
     pub(super) fn pass_all(&mut self) -> Result<(), LoadError> {
-        let path = self.path;
         let mut depth = 0u64;
-        while let Some(token) = self.tokens.peek().map_err(|line| unended(path, line))? {
+        while let Some(token) = self.tokens.peek()? {
             match &token.kind {
                 Kind::Word(word) if depth == 0 && word.starts_with(|c: char| c.is_ascii_uppercase()) => break,
                 Kind::Open => depth += 1,
                 Kind::Close => depth = depth.saturating_sub(1),
                 Kind::Word(_) | Kind::Text(_) => {}
             }
-            self.tokens.next().map_err(|line| unended(path, line))?;
+            self.tokens.next()?;
         }
         Ok(())
     }
@@ -71,20 +64,21 @@ impl<'a, 't> Arguments<'a, 't> {
     /// Passes over an option: a declaration or a name in quotes, and its values. Returns its name.
     pub(super) fn option(&mut self) -> Result<String, LoadError> {
         let declaration = self.text()?;
-        params::values(self.tokens, self.path, &self.place(), "Option")?;
+        let here = self.place();
+        params::values(self.tokens, &here, "Option")?;
         Ok(declaration.split_ascii_whitespace().next_back().unwrap_or_default().to_owned())
     }
 
     pub(super) fn params(&mut self) -> Result<Params, LoadError> {
-        params::read(self.tokens, self.path, self.line)
+        params::read(self.tokens, self.line)
     }
 
     /// As many numbers, bare or in brackets.
     pub(super) fn numbers<const N: usize>(&mut self) -> Result<[f64; N], LoadError> {
-        let (path, mut found, mut count, mut bracket) = (self.path, [0.0; N], 0, false);
+        let (mut found, mut count, mut bracket) = ([0.0; N], 0, false);
         while count < N || bracket {
-            let token = self.tokens.next().map_err(|line| unended(path, line))?;
-            let here = at(path, token.as_ref().map_or(self.line, |token| token.line));
+            let token = self.tokens.next()?;
+            let here = self.tokens.place(token.as_ref().map_or(self.line, |token| token.line));
             match token.map(|token| token.kind) {
                 Some(Kind::Open) if count == 0 && !bracket => bracket = true,
                 Some(Kind::Close) if bracket && count == N => bracket = false,
@@ -97,8 +91,4 @@ impl<'a, 't> Arguments<'a, 't> {
         }
         Ok(found)
     }
-}
-
-fn unended(path: &Path, line: u32) -> LoadError {
-    at(path, line).bad("a quote does not end")
 }

@@ -2,7 +2,8 @@
 
 use super::params::Params;
 use crate::error::LoadError;
-use glam::{DMat3, DMat4, DVec3};
+use crate::loaded::camera;
+use glam::{DMat3, DMat4};
 use noisefloor_ptwne::{Camera, FovAxis, Optics};
 
 /// Largest width or height that is read, in pixels.
@@ -43,11 +44,6 @@ impl Default for View {
 }
 
 impl View {
-    /// A camera for a builder that gets its own later.
-    pub(super) fn anywhere() -> Camera {
-        Camera { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0], vertical_fov: 45.0 }
-    }
-
     /// Reads a `Camera`; `from_world` is the transform there.
     pub(super) fn camera(&mut self, kind: &str, params: &Params, from_world: DMat4) -> Result<(), LoadError> {
         params.ignore(&["shutteropen", "shutterclose"]);
@@ -62,7 +58,7 @@ impl View {
                 }
             }
             "orthographic" => self.parallel = Some(1.0),
-            _ => return Err(params.place.clone().unsupported(format!("Camera \"{kind}\""))),
+            _ => return Err(params.place.unsupported(format!("Camera \"{kind}\""))),
         }
         if let Some(window) = params.numbers("screenwindow")? {
             match window {
@@ -72,7 +68,7 @@ impl View {
                     self.fov = 2.0 * ((0.5 * self.fov.to_radians()).tan() * half).atan().to_degrees();
                     self.parallel = self.parallel.map(|_| half);
                 }
-                _ => return Err(params.place.clone().unsupported("a `screenwindow` aside of the middle")),
+                _ => return Err(params.place.unsupported("a `screenwindow` aside of the middle")),
             }
         }
         self.lens_radius = params.float("lensradius")?.unwrap_or(0.0);
@@ -136,13 +132,7 @@ impl View {
     }
 
     pub(super) fn to_camera(&self) -> Camera {
-        let axes = DMat3::from_mat4(self.to_world);
-        let (eye, view) = (self.to_world.w_axis.truncate(), axes.z_axis.normalize_or_zero());
-        // Far from 0, a target close by would be rounded
-        let target = eye + view * eye.abs().max_element().max(1.0);
-        let array = |v: DVec3| v.as_vec3().to_array();
-        let up = array(axes.y_axis.normalize_or_zero());
-        Camera { eye: array(eye), target: array(target), up, vertical_fov: self.fov as f32 }
+        camera(self.to_world, self.fov as f32)
     }
 
     pub(super) fn optics(&self) -> Optics {

@@ -3,7 +3,7 @@
 use super::params::{Param, Params, Values};
 use super::reader::Reader;
 use crate::colour::{self, Quantity, TEMPERATURES};
-use crate::error::LoadError;
+use crate::error::{LoadError, LoadFault};
 use crate::files::{self, MAX_FILE_BYTES};
 use noisefloor::{Rgb, display::luminance};
 
@@ -61,7 +61,7 @@ impl Reader<'_> {
                 if texts[0] == "stdillum-D50" {
                     let what = "`stdillum-D50` is that of the CIE, [1.176 0.976 0.722]; \
                         pbrt's table of it lacks red: [1.087 1.000 0.750]";
-                    self.approximated(&params.place, what);
+                    self.load.approximated(&params.place, what);
                 }
                 let colour = self.named_spectrum(params, texts, Quantity::Light)?;
                 if self.version_3 { colour } else { normalised(colour) }
@@ -116,7 +116,7 @@ impl Reader<'_> {
         quantity: Quantity,
     ) -> Result<Rgb, LoadError> {
         let [name] = texts else { return Err(params.bad("a spectrum has one name")) };
-        let not_as = |what: &str| Err(params.place.clone().unsupported(format!("`{name}` as a {what}")));
+        let not_as = |what: &str| Err(params.place.unsupported(format!("`{name}` as a {what}")));
         let glass = GLASSES.iter().find(|glass| glass.0 == name).map(|glass| [glass.1; 3]);
         if let Some(index) = glass.or_else(|| metal(name)) {
             return if quantity == Quantity::Factor { Ok(index) } else { not_as("light") };
@@ -127,15 +127,13 @@ impl Reader<'_> {
         if is_of_a_sensor(name) {
             return not_as("spectrum: it is what a camera's sensor responds to, which is not held here");
         }
-        let path = self.folder.find(name, &params.place).map_err(|error| match error {
-            LoadError::Read { cause, .. } if cause.kind() == std::io::ErrorKind::NotFound => {
-                params.bad(format!(
-                    "there is no spectrum `{name}`: it is none of pbrt's names, and there is no such file"
-                ))
-            }
-            other => other,
+        let path = self.load.folder.find(name, &params.place).map_err(|error| match &error.fault {
+            LoadFault::Read(cause) if cause.kind() == std::io::ErrorKind::NotFound => params.bad(format!(
+                "there is no spectrum `{name}`: it is none of pbrt's names, and there is no such file"
+            )),
+            _ => error,
         })?;
-        let bytes = self.folder.read(&path, MAX_FILE_BYTES, &params.place)?;
+        let bytes = self.load.folder.read(&path, MAX_FILE_BYTES, &params.place)?;
         let text = files::text(&bytes);
         let words = files::lines(&text)
             .flat_map(|line| line.split('#').next().unwrap_or_default().split_ascii_whitespace());

@@ -71,7 +71,7 @@ impl Reader<'_> {
             "Option" => {
                 let name = args.option()?;
                 if !NO_OPTION_OF_PICTURES.contains(&name.as_str()) {
-                    self.ignored(&args.place(), format!("the option `{name}` is ignored"));
+                    self.load.ignored(&args.place(), format!("the option `{name}` is ignored"));
                 }
             }
             "ReverseOrientation" => self.state.reversed = !self.state.reversed,
@@ -81,7 +81,7 @@ impl Reader<'_> {
                 self.errors.take(result)?;
             }
             "Include" | "Import" => {
-                let included = self.folder.find(&args.text()?, &args.place())?;
+                let included = self.load.folder.find(&args.text()?, &args.place())?;
                 self.file(&included, depth + 1)?;
             }
             "NamedMaterial" => self.state.material = Look::Named(args.text()?, args.place()),
@@ -114,23 +114,19 @@ impl Reader<'_> {
     /// Executes a directive that begins or ends a part of the file. The result is whether it was one.
     fn nests(&mut self, word: &str, args: &mut Arguments<'_, '_>) -> Result<bool, LoadError> {
         let place = args.place();
-        let without_begin = || place.clone().bad(format!("{word} without its begin"));
+        let without_begin = || place.bad(format!("{word} without its begin"));
         match word {
             "AttributeBegin" => self.push(&place)?,
             "AttributeEnd" => self.state = self.stack.pop().ok_or_else(without_begin)?,
             "TransformBegin" => {
-                place.clone().at_most(
-                    "nested transforms",
-                    self.transforms.len() as u64,
-                    u64::from(MAX_DEPTH),
-                )?;
+                place.at_most("nested transforms", self.transforms.len() as u64, u64::from(MAX_DEPTH))?;
                 self.transforms.push(self.state.to_world);
             }
             "TransformEnd" => self.state.to_world = self.transforms.pop().ok_or_else(without_begin)?,
             "ObjectBegin" => {
                 let name = args.text()?;
                 if self.open_object.is_some() {
-                    return Err(place.clone().bad("an object in an object"));
+                    return Err(place.bad("an object in an object"));
                 }
                 self.push(&place)?;
                 self.open_object = Some((name, vec![]));
@@ -174,7 +170,7 @@ impl Reader<'_> {
             }
             "AreaLightSource" => {
                 if kind != "diffuse" && kind != "area" {
-                    return Err(params.place.clone().unsupported(called));
+                    return Err(params.place.unsupported(called));
                 }
                 let params = self.with_defaults("light", params)?;
                 self.state.area_light = self.area_light(&params)?.map(Rc::new);
@@ -188,9 +184,9 @@ impl Reader<'_> {
             }
             "MakeNamedMedium" => {
                 if !self.options.ignore_volumes {
-                    return Err(params.place.clone().unsupported(crate::options::NO_MEDIA));
+                    return Err(params.place.unsupported(crate::options::NO_MEDIA));
                 }
-                self.ignored(&params.place, "the participating medium is ignored");
+                self.load.ignored(&params.place, "the participating medium is ignored");
             }
             // None other is asked for
             _ => {}
@@ -213,7 +209,7 @@ impl Reader<'_> {
                 if self.view.clamp.is_some() {
                     let what = "`maxcomponentvalue` bounds red, green and blue, \
                         where the sensor of pbrt bounds X, Y and Z";
-                    self.approximated(&params.place, what);
+                    self.load.approximated(&params.place, what);
                 }
                 self.say_unused(params, called);
             }
@@ -223,14 +219,14 @@ impl Reader<'_> {
                 self.max_depth = u32::try_from(bounces).unwrap_or(u32::MAX).saturating_add(1);
                 if !matches!(kind, "path" | "volpath" | "simplepath" | "simplevolpath" | "bdpt") {
                     let what = format!("the integrator `{kind}` is replaced by path tracing");
-                    self.approximated(&params.place, what);
+                    self.load.approximated(&params.place, what);
                 }
                 // How samples are taken
                 params.ignore(&["lightsampler", "lightsamplestrategy", "strategy", "rrthreshold"]);
                 self.say_unused(params, called);
             }
             "ColorSpace" => {
-                let unknown = || params.place.clone().unsupported(format!("the colour space `{kind}`"));
+                let unknown = || params.place.unsupported(format!("the colour space `{kind}`"));
                 self.state.colour_space = ColourSpace::named(kind).ok_or_else(unknown)?;
             }
             // Noise, speed, and the filter of the picture, which is the caller's
@@ -245,7 +241,7 @@ impl Reader<'_> {
     fn with_defaults(&self, kind: &str, params: Params) -> Result<Params, LoadError> {
         let Some(defaults) = self.state.defaults.get(kind) else { return Ok(params) };
         // Each is copied, and compared with each
-        self.bounds.spend((16 + params.len()).saturating_mul(defaults.len()), &params.place)?;
+        self.load.bounds.spend((16 + params.len()).saturating_mul(defaults.len()), &params.place)?;
         Ok(params.or(defaults))
     }
 
@@ -261,7 +257,7 @@ impl Reader<'_> {
     }
 
     fn push(&mut self, place: &Place) -> Result<(), LoadError> {
-        place.clone().at_most("nested attributes", self.stack.len() as u64, 1024)?;
+        place.at_most("nested attributes", self.stack.len() as u64, 1024)?;
         self.stack.push(self.state.clone());
         Ok(())
     }

@@ -3,25 +3,14 @@
 use super::materials::Made;
 use super::reader::Reader;
 use super::state::Definition;
-use crate::channels;
 use crate::error::LoadError;
 use noisefloor::Rgb;
 use noisefloor_ptwne::{Dialect, Material, MaterialOptions, Principled, Texture};
 
 impl Reader<'_> {
-    pub(super) fn roughness(
-        &mut self,
-        d: &Definition,
-        missing: f64,
-        fourth: bool,
-        alphas: &mut Option<Texture>,
-    ) -> Result<f32, LoadError> {
-        self.roughness_of(d, "", missing, fourth, alphas)
-    }
-
     /// GGX α: pbrt 4 takes the square root of its roughness, pbrt 3 a polynomial of its logarithm. Into
     /// `alphas` comes what varies by place or direction.
-    pub(super) fn roughness_of(
+    pub(super) fn roughness(
         &mut self,
         d: &Definition,
         prefix: &str,
@@ -47,26 +36,10 @@ impl Reader<'_> {
                 1.621_42 + x * (0.819_955 + x * (0.1734 + x * (0.017_120_1 + x * 0.000_640_711)))
             }
         };
-        let found = self.joined(d, [&u, &v], |[u, v]| [alpha(u), alpha(v), 0.0])?;
-        let [u, v, _] = self.means.of(&found);
+        let found = self.load.joined(&d.params.place, [&u, &v], |[u, v]| [alpha(u), alpha(v), 0.0])?;
+        let [u, v, _] = self.load.means.of(&found);
         *alphas = Some(found).filter(|found| u != v || !matches!(found, Texture::Colour(_)));
         Ok((u * v).max(0.0).sqrt().min(1.0))
-    }
-
-    fn joined<const N: usize>(
-        &mut self,
-        d: &Definition,
-        parts: [&Texture; N],
-        put: impl Fn([f32; N]) -> Rgb,
-    ) -> Result<Texture, LoadError> {
-        let (texture, replaced) = channels::joined(parts, |texture| self.means.of(texture), put);
-        if replaced {
-            self.approximated(&d.params.place, "a second texture of another layout is replaced by its mean");
-        }
-        if let Texture::Image(image) = &texture {
-            self.count_pixels(&d.params.place, image.width * image.height)?;
-        }
-        Ok(texture)
     }
 
     /// η or k of a conductor. Values a little below 0, which fits of measurements have, count as 0.
@@ -75,7 +48,7 @@ impl Reader<'_> {
         let nearest = index.map(|x| x.clamp(0.0, 100.0));
         if nearest != index {
             let what = format!("`{name}` is {index:?}, and is brought into 0…100");
-            self.approximated(&d.params.place, what);
+            self.load.approximated(&d.params.place, what);
         }
         Ok(Some(nearest))
     }
@@ -105,26 +78,27 @@ impl Reader<'_> {
             ("scatterdistance", "light is scattered at the surface, not below it"),
         ] {
             if d.params.get(name).is_some() {
-                self.approximated(&d.params.place, format!("`{name}` of `disney` is left out: {what}"));
+                self.load.approximated(&d.params.place, format!("`{name}` of `disney` is left out: {what}"));
             }
         }
         d.params.ignore(&["flatness", "difftrans"]);
 
         // With metal m and transmission t, glass has the share s = (1 − m)t and the rest is of metal m/(1 −
         // s)
-        let metallic = self.means.of(&metal)[0];
+        let metallic = self.load.means.of(&metal)[0];
         let share = (1.0 - metallic) * transmission;
         let metal =
             if share > 0.0 && share < 1.0 { Texture::Colour([metallic / (1.0 - share); 3]) } else { metal };
-        let metallic_roughness = self.joined(d, [&roughness, &metal], |[r, m]| [1.0, r, m])?;
+        let metallic_roughness =
+            self.load.joined(&d.params.place, [&roughness, &metal], |[r, m]| [1.0, r, m])?;
         let surface = Principled { metallic_roughness, ior: ior.clamp(1.0, 4.0), ..surface };
         if share <= 0.0 {
             return Ok(Made::Plain(surface.into()));
         }
-        self.approximated(&d.params.place, "transmission of `disney` has its mean roughness and tint");
-        let refused = Self::refused(&d.params.place);
-        let roughness = self.means.of(&roughness)[0].powi(2);
-        let tint = self.means.of(&base).map(f32::sqrt);
+        self.load.approximated(&d.params.place, "transmission of `disney` has its mean roughness and tint");
+        let refused = d.params.place.refused();
+        let roughness = self.load.means.of(&roughness)[0].powi(2);
+        let tint = self.load.means.of(&base).map(f32::sqrt);
         let glass = Material::RoughGlass { ior: ior.clamp(0.25, 4.0), tint, roughness };
         if share >= 1.0 {
             return Ok(Made::Plain(glass));

@@ -4,17 +4,17 @@ use super::environment;
 use super::params::Params;
 use super::reader::Reader;
 use super::state::AreaLight;
+use crate::channels::linear;
 use crate::error::LoadError;
-use crate::picture::{self, Samples};
+use crate::picture;
 use glam::{DMat3, DVec3};
-use noisefloor::Rgb;
-use noisefloor::display::{luminance, srgb_decode};
+use noisefloor::{Rgb, display::luminance};
 use noisefloor_ptwne::{Emission, Environment, Falloff, ImageTexture, Pixels, Punctual, Texture, Wrap};
 use std::f64::consts::PI;
 
 impl Reader<'_> {
     pub(super) fn light_source(&mut self, kind: &str, params: &Params) -> Result<(), LoadError> {
-        let refused = Self::refused(&params.place);
+        let refused = params.place.refused();
         let to_world = self.state.to_world;
         let point = |name: &str, missing: DVec3| {
             Ok::<_, LoadError>(to_world.transform_point3(params.triple(name)?.unwrap_or(missing)))
@@ -53,7 +53,7 @@ impl Reader<'_> {
                 self.builder.punctual(spot).map_err(refused)
             }
             "infinite" => self.infinite(params),
-            _ => Err(params.place.clone().unsupported(format!("LightSource \"{kind}\""))),
+            _ => Err(params.place.unsupported(format!("LightSource \"{kind}\""))),
         }
     }
 
@@ -62,7 +62,7 @@ impl Reader<'_> {
             return Err(params.bad("a second light surrounds the scene; there can be only one"));
         }
         self.surrounded = true;
-        let refused = Self::refused(&params.place);
+        let refused = params.place.refused();
         params.ignore(&["samples", "nsamples"]);
         let illuminance = self.photometric(params, "illuminance")?;
         let radiance = self.light(params, "L")?;
@@ -89,7 +89,7 @@ impl Reader<'_> {
             rotation.z_axis.normalize_or_zero(),
         );
         let map = if width == height {
-            self.count_pixels(&params.place, 2 * width * height)?;
+            self.load.count_pixels(&params.place, 2 * width * height)?;
             environment::equal_area(width, &pixels, rotation)
         } else {
             environment::latitudes(width, height, pixels, rotation)
@@ -99,20 +99,10 @@ impl Reader<'_> {
 
     /// The linear values of a picture.
     fn linear_picture(&mut self, params: &Params, name: &str) -> Result<(usize, usize, Vec<Rgb>), LoadError> {
-        let path = self.folder.find(name, &params.place)?;
-        let picture = picture::read(&self.folder, &path, &params.place)?;
-        self.count_pixels(&params.place, 2 * picture.width * picture.height)?;
-        let decode = |code: f32| srgb_decode(code);
-        let pixels: Vec<Rgb> = match picture.samples {
-            Samples::Eight(codes) => {
-                codes.iter().map(|[r, g, b, _]| [*r, *g, *b].map(|c| decode(f32::from(c) / 255.0))).collect()
-            }
-            Samples::Sixteen(codes) => codes
-                .iter()
-                .map(|[r, g, b, _]| [*r, *g, *b].map(|c| decode(f32::from(c) / 65535.0)))
-                .collect(),
-            Samples::Linear(values) => values,
-        };
+        let path = self.load.folder.find(name, &params.place)?;
+        let picture = picture::read(&self.load.folder, &path, &params.place)?;
+        self.load.count_pixels(&params.place, 2 * picture.width * picture.height)?;
+        let pixels = linear(&picture.samples.pixels(false));
         if !pixels.iter().flatten().all(|v| v.is_finite()) {
             return Err(params.bad(format!("`{name}` has values that are not finite")));
         }

@@ -32,7 +32,7 @@ impl Reader<'_> {
             Look::Named(name, here) => self.named(&name, &here)?,
         };
         if shines && matches!(definition.kind.as_str(), "interface" | "none" | "") {
-            let refused = Self::refused(place);
+            let refused = place.refused();
             return self.builder.material(Material::Nothing).map_err(refused);
         }
         self.known_or_made(&definition, alpha, place)
@@ -52,9 +52,9 @@ impl Reader<'_> {
             return Ok(*known);
         }
         self.kept.push(definition.clone());
-        self.bounds.begin(address, format_args!("the material `{}`", definition.kind), place)?;
+        self.load.bounds.begin(address, format_args!("the material `{}`", definition.kind), place)?;
         let id = self.material(definition, alpha);
-        self.bounds.end();
+        self.load.bounds.end();
         let id = id?;
         self.materials.insert((address, called), id);
         Ok(id)
@@ -74,7 +74,7 @@ impl Reader<'_> {
 
     fn named(&self, name: &str, place: &Place) -> Result<Rc<Definition>, LoadError> {
         let found = self.named_materials.get(name).cloned();
-        found.ok_or_else(|| place.clone().bad(format!("there is no material `{name}`")))
+        found.ok_or_else(|| place.bad(format!("there is no material `{name}`")))
     }
 
     fn material(
@@ -84,7 +84,7 @@ impl Reader<'_> {
     ) -> Result<MaterialId, LoadError> {
         let relief = self.relief(definition)?;
         let opacity = self.opacity(definition, opacity)?;
-        let refused = Self::refused(&definition.params.place);
+        let refused = definition.params.place.refused();
         let mut alphas = None;
         let made = self.made(definition, &mut alphas)?;
         let options = MaterialOptions { opacity, relief, roughness: alphas, ..MaterialOptions::default() };
@@ -93,7 +93,7 @@ impl Reader<'_> {
         match made {
             Made::Plain(material) => {
                 let facets = (options.roughness.is_some(), options.facets);
-                self.bounds.coat(&material, facets, &definition.params.place)?;
+                self.load.bounds.coat(&material, facets, &definition.params.place)?;
                 self.builder.material_with(material, options).map_err(refused)
             }
             Made::Nothing => {
@@ -109,8 +109,8 @@ impl Reader<'_> {
     /// The opacity of `uber`, times that of the shape.
     fn opacity(&mut self, d: &Definition, of_shape: Option<Texture>) -> Result<Option<Texture>, LoadError> {
         let own = if d.kind == "uber" { self.texture_or_colour(d, "opacity")? } else { None };
-        if own.as_ref().map(|texture| self.means.of(texture)).is_some_and(|[r, g, b]| r != g || g != b) {
-            self.approximated(&d.params.place, "the colour of `opacity` is replaced by its mean");
+        if own.as_ref().map(|texture| self.load.means.of(texture)).is_some_and(|[r, g, b]| r != g || g != b) {
+            self.load.approximated(&d.params.place, "the colour of `opacity` is replaced by its mean");
         }
         Ok(match (own, of_shape) {
             (Some(own), Some(of_shape)) => Some(self.product(&d.params, own, of_shape)?),
@@ -135,7 +135,7 @@ impl Reader<'_> {
                 return Ok(Some(Relief::Heights { map, scale: *scale }));
             }
             let what = format!("the relief `{name}` is left out: its texture is no picture times a number");
-            self.ignored(&d.params.place, what);
+            self.load.ignored(&d.params.place, what);
         }
         Ok(None)
     }
@@ -156,29 +156,29 @@ impl Reader<'_> {
             }
             "coateddiffuse" => {
                 d.params.ignore(&["thickness", "g", "albedo", "maxdepth", "nsamples"]);
-                self.approximated(&d.params.place, near("a coat on a Lambertian base"));
+                self.load.approximated(&d.params.place, near("a coat on a Lambertian base"));
                 let (base, roughness) =
-                    (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, 0.0, true, alphas)?);
+                    (self.colour(d, "reflectance", [0.5; 3])?, self.roughness(d, "", 0.0, true, alphas)?);
                 plastic(base, [1.0; 3], self.index(d, 1.5)?, roughness)
             }
             "plastic" | "uber" | "substrate" | "translucent" => self.lobes(d, alphas)?.into(),
             "conductor" | "metal" | "coatedconductor" => self.conductor(d, alphas)?,
             "mirror" => {
                 let reflectance = self.colour(d, "Kr", [0.9; 3])?;
-                Material::Mirror { reflectance: self.means.of(&reflectance) }
+                Material::Mirror { reflectance: self.load.means.of(&reflectance) }
             }
             "dielectric" | "glass" | "thindielectric" => {
                 let tint = self.colour(d, "Kt", [1.0; 3])?;
-                let tint = self.means.of(&tint);
-                if self.texture_or_colour(d, "Kr")?.is_some_and(|k| self.means.of(&k) != [1.0; 3]) {
+                let tint = self.load.means.of(&tint);
+                if self.texture_or_colour(d, "Kr")?.is_some_and(|k| self.load.means.of(&k) != [1.0; 3]) {
                     let what = format!("`Kr` of the material `{}` is taken for 1", d.kind);
-                    self.approximated(&d.params.place, what);
+                    self.load.approximated(&d.params.place, what);
                 }
                 let ior = self.index(d, 1.5)?;
                 if d.kind == "thindielectric" {
                     Material::ThinGlass { ior, tint }
                 } else {
-                    let roughness = self.roughness(d, 0.0, d.kind == "dielectric", alphas)?;
+                    let roughness = self.roughness(d, "", 0.0, d.kind == "dielectric", alphas)?;
                     Material::RoughGlass { ior, tint, roughness }
                 }
             }
@@ -193,15 +193,15 @@ impl Reader<'_> {
                 Lobes { diffuse: diffuse?, through: through?, ..Lobes::default() }.into()
             }
             "subsurface" | "kdsubsurface" => {
-                self.approximated(&d.params.place, near("a coat on a Lambertian base"));
+                self.load.approximated(&d.params.place, near("a coat on a Lambertian base"));
                 d.params.ignore(&["sigma_a", "sigma_s", "mfp", "scale", "g", "name"]);
-                let roughness = self.roughness(d, 0.0, true, alphas)?;
+                let roughness = self.roughness(d, "", 0.0, true, alphas)?;
                 let name = if d.kind == "subsurface" { "reflectance" } else { "Kd" };
                 plastic(self.colour(d, name, [0.5; 3])?, [1.0; 3], self.index(d, 1.33)?, roughness)
             }
             "interface" | "none" | "" => return Ok(Made::Nothing),
             "mix" => return self.mix(d),
-            other => return Err(d.params.place.clone().unsupported(format!("the material `{other}`"))),
+            other => return Err(d.params.place.unsupported(format!("the material `{other}`"))),
         }))
     }
 
@@ -209,7 +209,7 @@ impl Reader<'_> {
     fn lobes(&mut self, d: &Definition, alphas: &mut Option<Texture>) -> Result<Lobes, LoadError> {
         let missing = if d.kind == "substrate" { 0.5 } else { 0.25 };
         let (diffuse, specular) = (self.colour(d, "Kd", [missing; 3])?, self.colour(d, "Ks", [missing; 3])?);
-        let roughness = self.roughness(d, 0.1, false, alphas)?.max(MIN_ROUGHNESS);
+        let roughness = self.roughness(d, "", 0.1, false, alphas)?.max(MIN_ROUGHNESS);
         let lobes = Lobes { diffuse, specular, roughness, ..Lobes::default() };
         let dielectric = |ior| Gloss::Dielectric { ior };
         Ok(match d.kind.as_str() {
@@ -217,8 +217,8 @@ impl Reader<'_> {
             "plastic" => Lobes { gloss: dielectric(1.0 / 1.5), ..lobes },
             "substrate" => Lobes { gloss: Gloss::AshikhminShirley, ..lobes },
             "uber" => {
-                if self.texture_or_colour(d, "Kt")?.is_some_and(|k| self.means.of(&k) != [0.0; 3]) {
-                    self.approximated(&d.params.place, "`Kt` of the material `uber` is left out");
+                if self.texture_or_colour(d, "Kt")?.is_some_and(|k| self.load.means.of(&k) != [0.0; 3]) {
+                    self.load.approximated(&d.params.place, "`Kt` of the material `uber` is left out");
                 }
                 let mirror = self.colour(d, "Kr", [0.0; 3])?;
                 Lobes { mirror, gloss: dielectric(self.index(d, 1.5)?), ..lobes }
@@ -226,9 +226,11 @@ impl Reader<'_> {
             _ => {
                 let [reflect, transmit] =
                     [self.colour(d, "reflect", [0.5; 3])?, self.colour(d, "transmit", [0.5; 3])?];
-                if self.means.of(&lobes.specular) != [0.0; 3] && self.means.of(&transmit) != [0.0; 3] {
+                if self.load.means.of(&lobes.specular) != [0.0; 3]
+                    && self.load.means.of(&transmit) != [0.0; 3]
+                {
                     let what = "the glossy transmission of the material `translucent` is left out";
-                    self.approximated(&d.params.place, what);
+                    self.load.approximated(&d.params.place, what);
                 }
                 Lobes {
                     through: self.product(&d.params, lobes.diffuse.clone(), transmit)?,
@@ -242,7 +244,7 @@ impl Reader<'_> {
 
     fn conductor(&mut self, d: &Definition, alphas: &mut Option<Texture>) -> Result<Material, LoadError> {
         if d.kind == "coatedconductor" {
-            self.approximated(&d.params.place, "the coat of a conductor is left out");
+            self.load.approximated(&d.params.place, "the coat of a conductor is left out");
             d.params.ignore(&[
                 "interface.roughness",
                 "interface.uroughness",
@@ -258,7 +260,7 @@ impl Reader<'_> {
         let prefix = if d.kind == "coatedconductor" { "conductor." } else { "" };
         let name = |name: &str| format!("{prefix}{name}");
         let missing = if d.kind == "metal" { 0.01 } else { 0.0 };
-        let roughness = self.roughness_of(d, prefix, missing, d.kind != "metal", alphas)?;
+        let roughness = self.roughness(d, prefix, missing, d.kind != "metal", alphas)?;
         // The reflectance is without prefix (`CoatedConductorMaterial::Create`)
         if let Some(reflectance) = self.texture_or_colour(d, "reflectance")? {
             return Ok(Material::RoughConductor { reflectance, roughness });
@@ -343,9 +345,9 @@ impl Reader<'_> {
             return Ok(d.params.float(name)?.unwrap_or(missing));
         }
         let what = format!("the texture of `{name}` is replaced by its mean");
-        self.approximated(&d.params.place, what);
+        self.load.approximated(&d.params.place, what);
         let texture = self.grey(d, name, missing)?;
-        Ok(f64::from(self.means.of(&texture).iter().sum::<f32>() / 3.0))
+        Ok(f64::from(self.load.means.of(&texture).iter().sum::<f32>() / 3.0))
     }
 
     /// The index of refraction: a number or a named glass.

@@ -19,7 +19,7 @@ impl Reader<'_> {
             "Rotate" => {
                 let [angle, x, y, z] = args.numbers()?;
                 let axis = DVec3::new(x, y, z).try_normalize();
-                let axis = axis.ok_or_else(|| place.clone().bad("a rotation needs an axis that is not 0"))?;
+                let axis = axis.ok_or_else(|| place.bad("a rotation needs an axis that is not 0"))?;
                 DMat4::from_axis_angle(axis, angle.to_radians())
             }
             "LookAt" => look_at(args.numbers()?, &place)?,
@@ -46,7 +46,7 @@ impl Reader<'_> {
             }
             "ActiveTransform" => {
                 args.pass()?;
-                self.approximated(&place, "everything stays where it is when the shutter opens");
+                self.load.approximated(&place, "everything stays where it is when the shutter opens");
                 return Ok(true);
             }
             _ => return Ok(false),
@@ -65,7 +65,7 @@ fn look_at(numbers: [f64; 9], place: &Place) -> Result<DMat4, LoadError> {
         Some([right, view.cross(right), view])
     });
     let what = "eye and target are the same, or `up` points along the view";
-    let [x, y, z] = axes.ok_or_else(|| place.clone().bad(what))?;
+    let [x, y, z] = axes.ok_or_else(|| place.bad(what))?;
     let to_world = DMat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), eye.extend(1.0));
     Ok(to_world.inverse())
 }

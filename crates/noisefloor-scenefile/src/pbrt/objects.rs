@@ -3,14 +3,15 @@
 use super::reader::Reader;
 use super::state::{Form, Object, Part, Wear};
 use crate::error::{LoadError, Place};
-use crate::mesh::{Triangles, rows, solids};
-use glam::{DMat3, DMat4, DVec3};
+use crate::mesh::Triangles;
+use crate::mesh::solids::{self, Ball, ball};
+use glam::{DMat4, DVec3};
 use noisefloor_ptwne::{MaterialId, SceneError};
 
 impl Reader<'_> {
     /// Shows an object where the state is. What does not shine is shared by all its instances.
     pub(super) fn instance(&mut self, name: &str, place: &Place) -> Result<(), LoadError> {
-        let missing = || place.clone().bad(format!("there is no object `{name}`"));
+        let missing = || place.bad(format!("there is no object `{name}`"));
         let mut object = self.objects.remove(name).ok_or_else(missing)?;
         let shown = self.show(&mut object, place);
         self.objects.insert(name.to_owned(), object);
@@ -18,7 +19,7 @@ impl Reader<'_> {
     }
 
     fn show(&mut self, object: &mut Object, place: &Place) -> Result<(), LoadError> {
-        let refused = Self::refused(place);
+        let refused = place.refused();
         let shared = match object.shared {
             Some(shared) => shared,
             None => {
@@ -38,16 +39,11 @@ impl Reader<'_> {
             }
         };
         let to_world = self.state.to_world;
-        match self.builder.instance(shared, rows(to_world)) {
-            Ok(()) => {}
-            Err(SceneError::Singular) => {
-                self.ignored(place, "an instance is left out: its transform is singular");
-                return Ok(());
-            }
-            Err(cause) => return Err(refused(cause)),
+        if !self.load.instance(&mut self.builder, shared, to_world, "an instance", place)? {
+            return Ok(());
         }
         for part in &object.parts {
-            self.folder.build(part.form.surfaces(), &part.place)?;
+            self.load.folder.build(part.form.surfaces(), &part.place)?;
             self.add(part.clone(), to_world)?;
         }
         Ok(())
@@ -58,16 +54,16 @@ impl Reader<'_> {
         let Part { form, wear, place } = part;
         let mut mesh = match form {
             Form::Mesh(mesh) => mesh,
-            Form::Ball(own, radius) => match ball(to_world * own, radius) {
+            Form::Ball(own, radius) => match ball(to_world * own, DVec3::ZERO, radius) {
                 Some(Ball { centre, radius, axes }) => {
                     let added =
                         self.builder.turned_sphere(centre, radius, axes, wear.material, wear.emission);
-                    return added.map_err(Self::refused(&place));
+                    return added.map_err(place.refused());
                 }
                 None => {
                     let own = own * DMat4::from_scale(DVec3::splat(radius));
                     let mut mesh = solids::sphere();
-                    self.folder.build(mesh.indices.len() as u64, &place)?;
+                    self.load.folder.build(mesh.indices.len() as u64, &place)?;
                     mesh.place(own);
                     mesh
                 }
@@ -86,18 +82,7 @@ impl Reader<'_> {
         material: MaterialId,
         place: &Place,
     ) -> Result<(), LoadError> {
-        let shared = self.balls.get(&material).copied();
-        match solids::ellipsoid(&mut self.builder, shared, material, to_world) {
-            Ok(ball) => {
-                self.balls.insert(material, ball);
-                Ok(())
-            }
-            Err(SceneError::Singular) => {
-                self.ignored(place, "a sphere is left out: its transform is singular");
-                Ok(())
-            }
-            Err(cause) => Err(LoadError::Scene { place: place.clone(), cause }),
-        }
+        self.balls.add(&self.load, &mut self.builder, material, to_world, place)
     }
 
     fn add_mesh(&mut self, mesh: &Triangles, wear: Wear, place: &Place) -> Result<(), LoadError> {
@@ -105,35 +90,15 @@ impl Reader<'_> {
             Ok(left_out) => {
                 // The poles of our own round shapes have no area either
                 if left_out > 0 && left_out == mesh.indices.len() {
-                    self.ignored(place, "a shape is left out: none of its faces has an area");
+                    self.load.ignored(place, "a shape is left out: none of its faces has an area");
                 }
                 Ok(())
             }
             Err(SceneError::EmptyEmitter) => {
-                self.ignored(place, "a shape is left out: it shines, but has no area");
+                self.load.ignored(place, "a shape is left out: it shines, but has no area");
                 Ok(())
             }
-            Err(cause) => Err(LoadError::Scene { place: place.clone(), cause }),
+            Err(cause) => Err(place.refused()(cause)),
         }
     }
-}
-
-/// A sphere as the renderer takes it.
-pub(super) struct Ball {
-    centre: [f32; 3],
-    radius: f32,
-    axes: [[f32; 3]; 3],
-}
-
-/// A sphere around the origin, moved; none if that stretches it.
-pub(super) fn ball(to_world: DMat4, radius: f64) -> Option<Ball> {
-    let axes = DMat3::from_mat4(to_world);
-    let scale = axes.x_axis.length();
-    let off = (axes.transpose() * axes - DMat3::IDENTITY * (scale * scale)).to_cols_array();
-    let even = off.iter().all(|x| x.abs() <= 1e-4 * scale * scale) && scale > 0.0;
-    let centre = to_world.w_axis.truncate().as_vec3().to_array();
-    // u runs around z from +x over +y; v = 1 is +z in pbrt, too
-    let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| (axis / scale).as_vec3());
-    let axes = [-x, z, -y].map(|axis| axis.to_array());
-    even.then_some(Ball { centre, radius: (radius * scale) as f32, axes })
 }

@@ -1,11 +1,10 @@
 //! Parameters of a directive: `"float fov" [40]`.
 
-use super::tokens::{Kind, Tokens};
+use super::tokens::{Kind, Token, Tokens};
 use crate::colour::ColourSpace;
 use crate::error::{LoadError, Place};
 use std::cell::Cell;
 use std::collections::HashMap;
-use std::path::Path;
 use std::rc::Rc;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -36,20 +35,18 @@ pub(super) struct Params {
 }
 
 /// Reads the parameters that follow. `line` is that of their directive.
-pub(super) fn read(tokens: &mut Tokens<'_>, path: &Path, line: u32) -> Result<Params, LoadError> {
-    let place = at(path, line);
+pub(super) fn read(tokens: &mut Tokens<'_>, line: u32) -> Result<Params, LoadError> {
+    let place = tokens.place(line);
     let mut all = Vec::new();
-    let open = |line: u32| at(path, line).bad("a quote does not end");
-    while let Some(token) = tokens.peek().map_err(open)? {
-        let Kind::Text(declaration) = &token.kind else { break };
-        let here = at(path, token.line);
+    while let Some(Token { kind: Kind::Text(declaration), line }) = tokens.peek()?.cloned() {
+        let here = tokens.place(line);
         let mut words = declaration.split_ascii_whitespace();
         let (Some(kind), Some(name), None) = (words.next(), words.next(), words.next()) else {
             return Err(here.bad(format!("`{declaration}` is not a type and a name")));
         };
         let (kind, name) = (kind.to_owned(), name.to_owned());
-        tokens.next().map_err(open)?;
-        let values = values(tokens, path, &here, &name)?;
+        tokens.next()?;
+        let values = values(tokens, &here, &name)?;
         let space = ColourSpace::default();
         all.push(Param { kind, name, values: Rc::new(values), space, used: Cell::new(false) });
     }
@@ -57,34 +54,28 @@ pub(super) fn read(tokens: &mut Tokens<'_>, path: &Path, line: u32) -> Result<Pa
 }
 
 /// One value, or some in brackets.
-pub(super) fn values(
-    tokens: &mut Tokens<'_>,
-    path: &Path,
-    here: &Place,
-    name: &str,
-) -> Result<Values, LoadError> {
-    let open = |line: u32| at(path, line).bad("a quote does not end");
+pub(super) fn values(tokens: &mut Tokens<'_>, here: &Place, name: &str) -> Result<Values, LoadError> {
     let (mut numbers, mut texts, mut switches) = (vec![], vec![], vec![]);
     let mut bracket = false;
     loop {
-        let Some(token) = tokens.next().map_err(open)? else {
-            return Err(here.clone().bad(format!("the values of `{name}` do not end")));
+        let Some(token) = tokens.next()? else {
+            return Err(here.bad(format!("the values of `{name}` do not end")));
         };
         match token.kind {
             Kind::Open if !bracket => {
                 bracket = true;
                 continue;
             }
-            Kind::Open => return Err(at(path, token.line).bad("a bracket in a bracket")),
+            Kind::Open => return Err(tokens.place(token.line).bad("a bracket in a bracket")),
             Kind::Close if bracket => break,
-            Kind::Close => return Err(at(path, token.line).bad("a `]` without a `[`")),
+            Kind::Close => return Err(tokens.place(token.line).bad("a `]` without a `[`")),
             Kind::Text(text) => match text.as_str() {
                 "true" | "false" => switches.push(text == "true"),
                 _ => texts.push(text),
             },
             Kind::Word(word) => match word.as_str() {
                 "true" | "false" => switches.push(word == "true"),
-                _ => numbers.push(number(&word, &at(path, token.line))?),
+                _ => numbers.push(number(&word, &tokens.place(token.line))?),
             },
         }
         if !bracket {
@@ -95,19 +86,14 @@ pub(super) fn values(
         (_, true, true) => Ok(Values::Numbers(numbers)),
         (true, false, true) => Ok(Values::Texts(texts)),
         (true, true, false) => Ok(Values::Switches(switches)),
-        _ => Err(here.clone().bad(format!("`{name}` mixes numbers, texts and switches"))),
+        _ => Err(here.bad(format!("`{name}` mixes numbers, texts and switches"))),
     }
 }
 
 /// A finite number.
 pub(super) fn number(word: &str, place: &Place) -> Result<f64, LoadError> {
     let number = word.parse().ok().filter(|x: &f64| x.is_finite());
-    number.ok_or_else(|| place.clone().bad(format!("`{word}` is not a finite number")))
-}
-
-/// A line of a file.
-pub(super) fn at(path: &Path, line: u32) -> Place {
-    Place::part(path, format_args!("line {line}"))
+    number.ok_or_else(|| place.bad(format!("`{word}` is not a finite number")))
 }
 
 impl Params {
@@ -143,7 +129,7 @@ impl Params {
     }
 
     pub(super) fn bad(&self, what: impl std::fmt::Display) -> LoadError {
-        self.place.clone().bad(what)
+        self.place.bad(what)
     }
 
     /// The parameter of that name, whatever its type.

@@ -2,19 +2,19 @@
 
 use super::arguments::Arguments;
 use super::camera::View;
-use super::params::{Params, at};
+use super::params::Params;
 use super::state::{Definition, Object, Part, State};
 use super::tokens::{Kind, Tokens};
-use crate::bounds::Bounds;
-use crate::channels::Means;
-use crate::error::{Errors, LoadError, Place, Warning};
-use crate::files::{self, Folder, MAX_FILE_BYTES, has_memory};
-use crate::loaded::{Loaded, title};
+use crate::error::{Errors, LoadError, Place};
+use crate::files::{self, MAX_FILE_BYTES, has_memory};
+use crate::load::Load;
+use crate::loaded::{Loaded, anywhere, title};
+use crate::mesh::solids::Balls;
 use crate::options::LoadOptions;
 use flate2::read::GzDecoder;
 use glam::DMat4;
-use noisefloor_ptwne::{MaterialId, ObjectId, Pixels, SceneBuilder, SceneError};
-use std::collections::{HashMap, HashSet};
+use noisefloor_ptwne::{MaterialId, Pixels, SceneBuilder};
+use std::collections::HashMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -30,15 +30,11 @@ const MAX_BYTES: u64 = 1 << 30;
 const MAX_FILES: u64 = 1 << 18;
 /// Longest file of directives that is kept, in bytes: what is included often is short.
 const KEPT: usize = 1 << 16;
-const MAX_WARNINGS: usize = 10_000;
-/// Most pixels of all pictures together.
-const MAX_PIXELS: u64 = 1 << 27;
 
 /// A scene that is being read.
 pub(super) struct Reader<'a> {
-    pub(super) path: PathBuf,
+    pub(super) load: Load,
     pub(super) options: &'a LoadOptions,
-    pub(super) folder: Folder,
     pub(super) state: State,
     pub(super) view: View,
     /// Collected parts of the scene. Its camera is set at the end.
@@ -49,15 +45,11 @@ pub(super) struct Reader<'a> {
     pub(super) kept: Vec<Rc<Definition>>,
     pub(super) objects: HashMap<String, Object>,
     /// Spheres that ellipsoids of a material share.
-    pub(super) balls: HashMap<MaterialId, ObjectId>,
+    pub(super) balls: Balls,
     /// The object that is being defined.
     pub(super) open_object: Option<(String, Vec<Part>)>,
     pub(super) surrounded: bool,
     pub(super) max_depth: u32,
-    pub(super) pixels: u64,
-    /// Of materials in materials, and of all work.
-    pub(super) bounds: Bounds,
-    pub(super) means: Means,
     /// Pixels with a factor above 1, by address and factor, and what they are where 1 is the most. The former stay here,
     /// so that no other ones get their address.
     pub(super) bounded: HashMap<(usize, [u32; 3]), (Pixels, Pixels)>,
@@ -72,32 +64,25 @@ pub(super) struct Reader<'a> {
     /// Short files of directives, by their paths.
     texts: HashMap<PathBuf, Rc<str>>,
     pub(super) errors: Errors,
-    warnings: Vec<Warning>,
-    said: HashSet<(Option<String>, String)>,
 }
 
 impl<'a> Reader<'a> {
     pub(super) fn new(path: &Path, options: &'a LoadOptions) -> Result<Self, LoadError> {
         let place = Place::file(path);
-        let refused = |cause| LoadError::Scene { place: place.clone(), cause };
         Ok(Self {
-            path: path.to_owned(),
+            load: Load::new(path, options.root.as_deref(), options.identity()),
             options,
-            folder: Folder::of(path, options.root.as_deref(), options.identity()),
             state: State::new(place.clone()),
             view: View::default(),
-            builder: SceneBuilder::new(title(path), View::anywhere()).map_err(refused)?,
+            builder: SceneBuilder::new(title(path), anywhere()).map_err(place.refused())?,
             named_materials: HashMap::new(),
             materials: HashMap::new(),
             kept: vec![],
             objects: HashMap::new(),
-            balls: HashMap::new(),
+            balls: Balls::default(),
             open_object: None,
             surrounded: false,
             max_depth: BOUNCES + 1,
-            pixels: 0,
-            bounds: Bounds::default(),
-            means: Means::default(),
             bounded: HashMap::new(),
             stack: vec![],
             transforms: vec![],
@@ -108,17 +93,15 @@ impl<'a> Reader<'a> {
             files: 0,
             texts: HashMap::new(),
             errors: Errors::default(),
-            warnings: vec![],
-            said: HashSet::new(),
         })
     }
 
     /// Executes the file in `path`, which may be gzipped.
     pub(super) fn file(&mut self, path: &Path, depth: u32) -> Result<(), LoadError> {
         let place = Place::file(path);
-        place.clone().at_most("levels of included files", u64::from(depth), u64::from(MAX_DEPTH))?;
+        place.at_most("levels of included files", u64::from(depth), u64::from(MAX_DEPTH))?;
         self.files += 1;
-        place.clone().at_most("files of directives", self.files, MAX_FILES)?;
+        place.at_most("files of directives", self.files, MAX_FILES)?;
         let text = match self.texts.get(path) {
             Some(text) => text.clone(),
             None => {
@@ -133,91 +116,69 @@ impl<'a> Reader<'a> {
         self.bytes += text.len() as u64;
         let what = "bytes of directives so far (a file that is included again counts again)";
         place.at_most(what, self.bytes, MAX_BYTES)?;
-        self.version_3 |= depth == 0 && has_world_end(&text);
-        let mut tokens = Tokens::new(&text);
+        self.version_3 |= depth == 0 && has_world_end(path, &text);
+        let mut tokens = Tokens::new(path, &text);
         loop {
-            let open = |line: u32| at(path, line).bad("a quote does not end");
-            let Some(token) = tokens.next().map_err(open)? else { return Ok(()) };
+            let Some(token) = tokens.next()? else { return Ok(()) };
             let word = match token.kind {
                 Kind::Word(word) if word.starts_with(|c: char| c.is_ascii_alphabetic()) => word,
-                _ => return Err(at(path, token.line).bad("expected a directive such as Shape")),
+                _ => return Err(tokens.place(token.line).bad("expected a directive such as Shape")),
             };
-            self.directive(&word, &mut Arguments::new(&mut tokens, path, token.line, &word), depth)?;
+            self.directive(&word, &mut Arguments::new(&mut tokens, token.line, &word), depth)?;
         }
     }
 
     /// The bytes of a file, inflated if it is gzipped.
     pub(super) fn bytes_of(&self, path: &Path, limit: u64, place: &Place) -> Result<Vec<u8>, LoadError> {
-        let bytes = self.folder.read(path, limit.min(MAX_FILE_BYTES), place)?;
+        let bytes = self.load.folder.read(path, limit.min(MAX_FILE_BYTES), place)?;
         if !bytes.starts_with(&[0x1f, 0x8b]) {
             return Ok(bytes);
         }
         // DEFLATE makes at most 1032 bytes of one; twice, since a buffer that grows is copied
-        let most = limit.min(self.folder.left());
+        let most = limit.min(self.load.folder.left());
         has_memory(most.min(1032 * bytes.len() as u64), 2, place)?;
         let mut inflated = Vec::new();
         let read = GzDecoder::new(bytes.as_slice()).take(most + 1).read_to_end(&mut inflated);
         read.map_err(|e| Place::file(path).bad(format!("the file cannot be inflated: {e}")))?;
         let length = inflated.len() as u64;
         Place::file(path).at_most("bytes, inflated", length, limit)?;
-        self.folder.inflate(length, &Place::file(path))?;
+        self.load.folder.inflate(length, &Place::file(path))?;
         Ok(inflated)
     }
 
-    /// The error that the renderer does not take something.
-    pub(super) fn refused(place: &Place) -> impl Fn(SceneError) -> LoadError + use<> {
-        let place = place.clone();
-        move |cause| LoadError::Scene { place: place.clone(), cause }
-    }
-
-    pub(super) fn ignored(&mut self, place: &Place, what: impl std::fmt::Display) {
-        self.warn(Warning::ignored(place.clone(), what));
-    }
-
-    pub(super) fn approximated(&mut self, place: &Place, what: impl std::fmt::Display) {
-        self.warn(Warning::approximated(place.clone(), what));
-    }
-
-    fn warn(&mut self, warning: Warning) {
-        let key = (warning.place.part.clone(), warning.what.clone());
-        if self.warnings.len() < MAX_WARNINGS && self.said.insert(key) {
-            self.warnings.push(warning);
-        }
-    }
-
     /// Warns of parameters that nobody asked for.
-    pub(super) fn say_unused(&mut self, params: &Params, called: &str) {
-        let unused: Vec<String> = params.unused().map(|p| p.name.clone()).collect();
-        for name in unused {
-            self.ignored(&params.place, format!("`{name}` of {called} is ignored"));
+    pub(super) fn say_unused(&self, params: &Params, called: &str) {
+        for param in params.unused() {
+            self.load.ignored(&params.place, format!("`{}` of {called} is ignored", param.name));
         }
-    }
-
-    /// Counts pixels that are kept, and refuses more than [`MAX_PIXELS`].
-    pub(super) fn count_pixels(&mut self, place: &Place, count: usize) -> Result<(), LoadError> {
-        self.pixels = self.pixels.saturating_add(count as u64);
-        place.clone().at_most("pixels in all pictures so far", self.pixels, MAX_PIXELS)
     }
 
     /// The scene, after the last directive.
     pub(super) fn finish(self) -> Result<Loaded, LoadError> {
-        let Self { view, mut builder, errors, warnings, path, max_depth, in_world, folder, .. } = self;
+        let Self { view, mut builder, errors, load, max_depth, in_world, .. } = self;
         errors.finish()?;
-        let whole = Place::file(&path);
+        let whole = Place::file(&load.path);
         if !in_world {
             return Err(whole.bad("the scene has no WorldBegin: it is a part of another file"));
         }
-        let refused = Self::refused(&whole);
+        let refused = whole.refused();
         builder.optics(view.optics()).map_err(&refused)?;
         let scene = builder.build().map_err(&refused)?;
-        let scene = scene.with_camera(view.to_camera()).map_err(&refused)?.with_identity(folder.contents());
-        Ok(Loaded { scene, size: Some(view.size()), max_depth: Some(max_depth), clamp: view.clamp, warnings })
+        let scene =
+            scene.with_camera(view.to_camera()).map_err(&refused)?.with_identity(load.folder.contents());
+        Ok(Loaded {
+            scene,
+            size: Some(view.size()),
+            max_depth: Some(max_depth),
+            clamp: view.clamp,
+            warnings: load.into_warnings(),
+        })
     }
 }
 
 /// Whether a file has the directive `WorldEnd`, which version 4 has not: a comment may have the word.
-fn has_world_end(text: &str) -> bool {
-    let mut tokens = Tokens::new(text);
+fn has_world_end(path: &Path, text: &str) -> bool {
+    let mut tokens = Tokens::new(path, text);
     text.contains("WorldEnd")
         && std::iter::from_fn(|| tokens.next().ok().flatten())
             .any(|token| matches!(token.kind, Kind::Word(word) if word == "WorldEnd"))

@@ -1,6 +1,5 @@
 //! Shapes.
 
-use super::objects::ball;
 use super::params::Params;
 use super::reader::Reader;
 use super::state::{Form, Part, Wear};
@@ -19,11 +18,11 @@ impl Reader<'_> {
     pub(super) fn shape(&mut self, kind: &str, params: &Params) -> Result<(), LoadError> {
         if self.state.in_medium {
             if !self.options.ignore_volumes {
-                return Err(params.place.clone().unsupported(crate::options::NO_MEDIA));
+                return Err(params.place.unsupported(crate::options::NO_MEDIA));
             }
-            self.ignored(&params.place, "the participating medium is ignored");
+            self.load.ignored(&params.place, "the participating medium is ignored");
         }
-        self.bounds.spend(params.numbers_in_all(), &params.place)?;
+        self.load.bounds.spend(params.numbers_in_all(), &params.place)?;
         let alpha = self.alpha(params)?;
         let light = self.state.area_light.clone();
         let material = self.current_material(alpha, light.is_some(), &params.place)?;
@@ -35,7 +34,7 @@ impl Reader<'_> {
         let (place, to_world) = (params.place.clone(), self.state.to_world);
         let whole = if kind == "sphere" && !turned && !pictured { whole_sphere(params)? } else { None };
         let form = if let Some(radius) = whole
-            && (in_object || ball(to_world, 1.0).is_some())
+            && (in_object || solids::ball(to_world, DVec3::ZERO, 1.0).is_some())
         {
             Form::Ball(to_world, radius)
         } else if let Some(radius) = whole
@@ -46,16 +45,16 @@ impl Reader<'_> {
         } else {
             let mesh = self.mesh(kind, params)?;
             if mesh.indices.is_empty() {
-                self.ignored(&place, "the mesh has no faces");
+                self.load.ignored(&place, "the mesh has no faces");
             }
             Form::Mesh(mesh)
         };
-        self.folder.build(form.surfaces(), &place)?;
+        self.load.folder.build(form.surfaces(), &place)?;
         let emission = match light {
             Some(light) => {
                 if light.power.is_some() && parts_of(kind, &form) > 1 {
                     let what = "`power` is that of all faces of a mesh together, where pbrt gives it to each";
-                    self.approximated(&place, what);
+                    self.load.approximated(&place, what);
                 }
                 Some(light.of_area(area(&form), &place)?)
             }
@@ -74,7 +73,7 @@ impl Reader<'_> {
 
     /// The triangles of a shape where the state is, with their fronts as it says.
     fn mesh(&mut self, kind: &str, params: &Params) -> Result<Triangles, LoadError> {
-        let (mut mesh, own) = self.form(kind, params)?;
+        let mut mesh = self.form(kind, params)?;
         mesh.check(&params.place)?;
         if self.is_textured() {
             mesh.map_each([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
@@ -87,22 +86,20 @@ impl Reader<'_> {
                 mesh.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
             }
         }
-        mesh.place(self.state.to_world * own);
+        mesh.place(self.state.to_world);
         Ok(mesh)
     }
 
-    /// The triangles of a shape, and where they lie in its own coordinates.
-    fn form(&mut self, kind: &str, params: &Params) -> Result<(Triangles, DMat4), LoadError> {
-        Ok(match kind {
-            "trianglemesh" => (self.triangle_mesh(params)?, DMat4::IDENTITY),
-            "bilinearmesh" => (self.bilinear_mesh(params)?, DMat4::IDENTITY),
-            "loopsubdiv" => (self.subdivision(params)?, DMat4::IDENTITY),
-            "plymesh" => (self.ply_mesh(params)?, DMat4::IDENTITY),
-            "sphere" | "cylinder" | "disk" | "cone" | "paraboloid" | "hyperboloid" => {
-                (quadric(kind, params)?, DMat4::IDENTITY)
-            }
-            _ => return Err(params.place.clone().unsupported(format!("Shape \"{kind}\""))),
-        })
+    /// The triangles of a shape in its own coordinates.
+    fn form(&mut self, kind: &str, params: &Params) -> Result<Triangles, LoadError> {
+        match kind {
+            "trianglemesh" => self.triangle_mesh(params),
+            "bilinearmesh" => self.bilinear_mesh(params),
+            "loopsubdiv" => self.subdivision(params),
+            "plymesh" => self.ply_mesh(params),
+            "sphere" | "cylinder" | "disk" | "cone" | "paraboloid" | "hyperboloid" => quadric(kind, params),
+            _ => Err(params.place.unsupported(format!("Shape \"{kind}\""))),
+        }
     }
 
     /// Where the shape is: a number or a texture, and what to call it.
@@ -125,40 +122,27 @@ impl Reader<'_> {
     fn triangle_mesh(&self, params: &Params) -> Result<Triangles, LoadError> {
         // Of textures that count faces, which are not read
         params.ignore(&["faceIndices"]);
-        let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
         let uvs = match params.rows::<2>("uv")? {
             Some(uvs) => Some(uvs),
             None => params.rows::<2>("st")?,
         };
         let indices = corners::<3>(params, "indices")?.unwrap_or_else(|| vec![[0, 1, 2]]);
-        let normals = params.rows::<3>("N")?.unwrap_or_default();
-        let uvs = uvs.unwrap_or_default();
-        let mesh = Triangles { positions, normals, uvs, indices, ..Triangles::default() };
-        self.fits(params, mesh)
+        vertices(params, uvs, indices)
     }
 
     /// Squares, each as two triangles.
     fn bilinear_mesh(&mut self, params: &Params) -> Result<Triangles, LoadError> {
-        let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
         let corners = corners::<4>(params, "indices")?.unwrap_or_else(|| vec![[0, 1, 2, 3]]);
         // Corners come in rows
         let indices = corners.iter().flat_map(|[a, b, c, d]| [[*a, *b, *d], [*a, *d, *c]]).collect();
-        let (normals, uvs) = (params.rows::<3>("N")?, params.rows::<2>("uv")?);
-        self.approximated(&params.place, "a bilinear patch is replaced by two triangles");
-        let mesh = Triangles {
-            positions,
-            normals: normals.unwrap_or_default(),
-            uvs: uvs.unwrap_or_default(),
-            indices,
-            ..Triangles::default()
-        };
-        self.fits(params, mesh)
+        self.load.approximated(&params.place, "a bilinear patch is replaced by two triangles");
+        vertices(params, params.rows::<2>("uv")?, indices)
     }
 
     /// Loop's subdivision of a mesh, whose vertices lie on its limit.
     fn subdivision(&mut self, params: &Params) -> Result<Triangles, LoadError> {
         params.ignore(&["scheme"]);
-        let positions = params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))?;
+        let positions = points(params)?;
         let indices = corners::<3>(params, "indices")?.ok_or_else(|| params.bad("a mesh needs `indices`"))?;
         // Version 3 calls them nlevels
         let name = if params.get("levels").is_some() { "levels" } else { "nlevels" };
@@ -166,7 +150,7 @@ impl Reader<'_> {
         let mut mesh = Triangles { positions, indices, ..Triangles::default() };
         mesh.check(&params.place)?;
         let after = subdivide::triangles_after(mesh.indices.len() as u64, levels).unwrap_or(u64::MAX);
-        params.place.clone().at_most("triangles of a subdivision", after, self.folder.unbuilt())?;
+        params.place.at_most("triangles of a subdivision", after, self.load.folder.unbuilt())?;
         has_memory(after, SUBDIVIDING, &params.place)?;
         Ok(subdivide::subdivide(&mesh, levels))
     }
@@ -175,28 +159,37 @@ impl Reader<'_> {
         let name = params.text("filename")?.ok_or_else(|| params.bad("a plymesh needs a `filename`"))?;
         for relief in ["displacement", "displacement.edgelength"] {
             if params.get(relief).is_some() {
-                self.ignored(&params.place, "the displacement of a mesh is left out");
+                self.load.ignored(&params.place, "the displacement of a mesh is left out");
             }
         }
-        let path = self.folder.find(name, &params.place)?;
+        let path = self.load.folder.find(name, &params.place)?;
         let bytes = self.bytes_of(&path, MAX_FILE_BYTES, &params.place)?;
         let mesh = ply::parse(&bytes, &path)?;
         for unread in &mesh.unread {
-            self.ignored(&Place::file(&path), format!("{unread} is ignored"));
+            self.load.ignored(&Place::file(&path), format!("{unread} is ignored"));
         }
         Ok(mesh)
     }
+}
 
-    /// Checks that normals and texture coordinates are as many as points.
-    fn fits(&self, params: &Params, mesh: Triangles) -> Result<Triangles, LoadError> {
-        let points = mesh.positions.len();
-        for (name, found) in [("N", mesh.normals.len()), ("uv", mesh.uvs.len())] {
-            if found != 0 && found != points {
-                return Err(params.bad(format!("`{name}` has {found} rows for {points} points")));
-            }
+fn points(params: &Params) -> Result<Vec<[f32; 3]>, LoadError> {
+    params.rows::<3>("P")?.ok_or_else(|| params.bad("a mesh needs its points `P`"))
+}
+
+/// A mesh whose normals and texture coordinates are as many as its points.
+fn vertices(
+    params: &Params,
+    uvs: Option<Vec<[f32; 2]>>,
+    indices: Vec<[u32; 3]>,
+) -> Result<Triangles, LoadError> {
+    let (positions, uvs) = (points(params)?, uvs.unwrap_or_default());
+    let normals = params.rows::<3>("N")?.unwrap_or_default();
+    for (name, found) in [("N", normals.len()), ("uv", uvs.len())] {
+        if found != 0 && found != positions.len() {
+            return Err(params.bad(format!("`{name}` has {found} rows for {} points", positions.len())));
         }
-        Ok(mesh)
     }
+    Ok(Triangles { positions, normals, uvs, indices, ..Triangles::default() })
 }
 
 /// How many shapes a shape is to pbrt, each of which is a light of its own.

@@ -51,7 +51,7 @@ impl AreaLight {
         let Some(power) = self.power else { return Ok(self.emission.clone()) };
         let radiance = self.emission.radiance.map(|c| (f64::from(c) * power / area) as f32);
         if !radiance.iter().all(|c| c.is_finite()) {
-            return Err(place.clone().bad("`power` needs a shape that has an area"));
+            return Err(place.bad("`power` needs a shape that has an area"));
         }
         Ok(Emission { radiance, ..self.emission.clone() })
     }

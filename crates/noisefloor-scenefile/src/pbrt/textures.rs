@@ -6,7 +6,7 @@ use super::state::{Definition, Height, plain};
 use crate::channels::{self, linear};
 use crate::error::{LoadError, Place};
 use crate::picture::{self, Samples};
-use noisefloor::{Rgb, display::srgb_decode};
+use noisefloor::Rgb;
 use noisefloor_ptwne::{ImageTexture, Pixels, Texture, Wrap};
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -55,15 +55,15 @@ impl Reader<'_> {
                     self.operand(params, "amount", 0.5, &numbers)?
                 } else {
                     params.ignore(&["dir"]);
-                    self.approximated(&params.place, "a mix by direction is half of each");
+                    self.load.approximated(&params.place, "a mix by direction is half of each");
                     Texture::Colour([0.5; 3])
                 };
-                self.combined(params, [&first, &second, &amount], |[a, b, t]| {
+                self.load.combined(&params.place, [&first, &second, &amount], |[a, b, t]| {
                     std::array::from_fn(|i| (1.0 - t[i]) * a[i] + t[i] * b[i])
                 })?
             }
             _ => {
-                self.approximated(
+                self.load.approximated(
                     &params.place,
                     format!("the texture `{class}` is replaced by a grey of 0.5"),
                 );
@@ -82,7 +82,7 @@ impl Reader<'_> {
         let textures = if floats { &mut self.state.float_textures } else { &mut self.state.colour_textures };
         // A copy, if an outer block has them, too
         if Rc::strong_count(textures) > 1 {
-            self.bounds.spend(100 * textures.len(), &params.place)?;
+            self.load.bounds.spend(100 * textures.len(), &params.place)?;
         }
         Rc::make_mut(textures).insert(name.to_owned(), texture);
         Ok(())
@@ -94,16 +94,17 @@ impl Reader<'_> {
             if matches!(texture, Texture::Image(_)) {
                 let what =
                     format!("the picture on squares of a checkerboard, `{name}`, is replaced by its mean");
-                self.approximated(&params.place, what);
+                self.load.approximated(&params.place, what);
             }
             self.inside(&params.place, texture)
         });
-        let (a, b) = (self.means.of(&first?), self.means.of(&second?));
+        let (a, b) = (self.load.means.of(&first?), self.load.means.of(&second?));
         let image = ImageTexture::new(2, 2, Pixels::Float(Arc::new([b, a, a, b])));
         // pbrt's squares have the size 1, a picture of ours has two
         let to_uv = self.uv_map(params)?.map(|row| row.map(|x| 0.5 * x));
         if params.count("dimension")?.is_some_and(|dimension| dimension != 2) {
-            self.approximated(&params.place, "a checkerboard in space is laid on by texture coordinates");
+            self.load
+                .approximated(&params.place, "a checkerboard in space is laid on by texture coordinates");
         }
         Ok(Texture::Image(ImageTexture { to_uv, nearest: true, ..image }))
     }
@@ -156,25 +157,8 @@ impl Reader<'_> {
             | (Texture::Colour(colour), Texture::Image(image)) => {
                 Texture::Image(ImageTexture { factor: times([image.factor, colour]), ..image })
             }
-            (first, second) => self.combined(params, [&first, &second], times)?,
+            (first, second) => self.load.combined(&params.place, [&first, &second], times)?,
         })
-    }
-
-    /// Textures as one, whose pixels `put` makes of theirs.
-    fn combined<const N: usize>(
-        &mut self,
-        params: &Params,
-        parts: [&Texture; N],
-        put: impl Fn([Rgb; N]) -> Rgb,
-    ) -> Result<Texture, LoadError> {
-        let (texture, replaced) = channels::combined(parts, |texture| self.means.of(texture), put);
-        if replaced {
-            self.approximated(&params.place, "a second texture of another layout is replaced by its mean");
-        }
-        if let Texture::Image(image) = &texture {
-            self.count_pixels(&params.place, image.width * image.height)?;
-        }
-        Ok(texture)
     }
 
     /// A texture as a factor on light: what exceeds 1 is 1.
@@ -184,7 +168,7 @@ impl Reader<'_> {
             Texture::Image(image) if image.factor.iter().any(|c| *c > 1.0) => {
                 let key = (channels::address(&image.pixels), image.factor.map(f32::to_bits));
                 if !self.bounded.contains_key(&key) {
-                    self.count_pixels(place, image.width * image.height)?;
+                    self.load.count_pixels(place, image.width * image.height)?;
                     let bounded = channels::mapped(&image, |p| p).pixels;
                     self.bounded.insert(key, (image.pixels, bounded));
                 }
@@ -199,16 +183,16 @@ impl Reader<'_> {
     fn image_map(&mut self, params: &Params, floats: bool) -> Result<(Texture, Height), LoadError> {
         let name = params.text("filename")?.ok_or_else(|| params.bad("an imagemap needs a `filename`"))?;
         params.ignore(&["maxanisotropy", "trilinear"]);
-        let path = self.folder.find(name, &params.place)?;
-        let picture = picture::read(&self.folder, &path, &params.place)?;
+        let path = self.load.folder.find(name, &params.place)?;
+        let picture = picture::read(&self.load.folder, &path, &params.place)?;
         let count = picture.width * picture.height;
-        self.count_pixels(&params.place, count)?;
+        self.load.count_pixels(&params.place, count)?;
         let encoding = params.text("encoding")?;
         let raw = match (encoding, params.switch("gamma", true)?) {
             (Some("linear"), _) | (_, false) => true,
             (Some("sRGB") | None, true) => false,
             (Some(other), _) => {
-                self.approximated(&params.place, format!("the encoding `{other}` is replaced by sRGB"));
+                self.load.approximated(&params.place, format!("the encoding `{other}` is replaced by sRGB"));
                 false
             }
         };
@@ -220,7 +204,8 @@ impl Reader<'_> {
             "repeat" => Wrap::Repeat,
             "clamp" => Wrap::Clamp,
             other => {
-                self.approximated(&params.place, format!("the wrap mode `{other}` is replaced by `clamp`"));
+                self.load
+                    .approximated(&params.place, format!("the wrap mode `{other}` is replaced by `clamp`"));
                 Wrap::Clamp
             }
         };
@@ -230,7 +215,7 @@ impl Reader<'_> {
         let image = ImageTexture { to_uv, wrap: [wrap; 2], nearest, ..image };
         let scale = params.float("scale")?.unwrap_or(1.0) as f32;
         if params.switch("invert", false)? {
-            self.count_pixels(&params.place, count)?;
+            self.load.count_pixels(&params.place, count)?;
             let inverse = |p: Rgb| p.map(|c| (scale * (1.0 - c)).clamp(0.0, 1.0));
             let height = Height { map: image.clone(), scale: -scale };
             let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(inverse).collect());
@@ -246,7 +231,7 @@ impl Reader<'_> {
     /// `uscale`, `vscale`, `udelta` and `vdelta`.
     fn uv_map(&mut self, params: &Params) -> Result<[[f32; 3]; 2], LoadError> {
         if params.text("mapping")?.is_some_and(|mapping| mapping != "uv") {
-            self.approximated(&params.place, "the texture is laid on by texture coordinates");
+            self.load.approximated(&params.place, "the texture is laid on by texture coordinates");
             params.ignore(&["v1", "v2"]);
         }
         let number =
@@ -259,9 +244,9 @@ impl Reader<'_> {
     /// A picture of normals, whose codes are linear.
     pub(super) fn normal_map(&mut self, d: &Definition, name: &str) -> Result<Texture, LoadError> {
         let place = &d.params.place;
-        let path = self.folder.find(name, place)?;
-        let picture = picture::read(&self.folder, &path, place)?;
-        self.count_pixels(place, picture.width * picture.height)?;
+        let path = self.load.folder.find(name, place)?;
+        let picture = picture::read(&self.load.folder, &path, place)?;
+        self.load.count_pixels(place, picture.width * picture.height)?;
         let pixels = texels(picture.samples, true, false);
         Ok(Texture::Image(ImageTexture::new(picture.width, picture.height, pixels)))
     }
@@ -271,19 +256,11 @@ impl Reader<'_> {
 fn texels(samples: Samples, raw: bool, alpha_alone: bool) -> Pixels {
     match samples {
         Samples::Eight(codes) if alpha_alone => Pixels::Linear8(codes.iter().map(|p| [p[3]; 3]).collect()),
-        Samples::Eight(codes) if raw => Pixels::Linear8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect()),
-        Samples::Eight(codes) => Pixels::Srgb8(codes.iter().map(|p| [p[0], p[1], p[2]]).collect()),
-        Samples::Sixteen(codes) => {
-            let value = |code: u16| {
-                let value = f32::from(code) / 65535.0;
-                if raw { value } else { srgb_decode(value) }
-            };
-            Pixels::Float(codes.iter().map(|p| [p[0], p[1], p[2]].map(value)).collect())
-        }
         Samples::Linear(values) => {
             // Also false for NaN
             let inside = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
             Pixels::Float(values.iter().map(|p| p.map(inside)).collect())
         }
+        samples => samples.pixels(raw),
     }
 }

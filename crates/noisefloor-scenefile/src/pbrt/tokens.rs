@@ -1,5 +1,8 @@
 //! The words of a pbrt file.
 
+use crate::error::{LoadError, Place};
+use std::path::Path;
+
 /// A word, and the line it is on.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Token {
@@ -17,32 +20,33 @@ pub(super) enum Kind {
 }
 
 pub(super) struct Tokens<'a> {
+    pub(super) path: &'a Path,
     rest: &'a str,
     line: u32,
     peeked: Option<Token>,
 }
 
 impl<'a> Tokens<'a> {
-    pub(super) fn new(text: &'a str) -> Self {
-        Self { rest: text, line: 1, peeked: None }
+    pub(super) fn new(path: &'a Path, text: &'a str) -> Self {
+        Self { path, rest: text, line: 1, peeked: None }
     }
 
     /// The next token, which stays.
-    pub(super) fn peek(&mut self) -> Result<Option<&Token>, u32> {
+    pub(super) fn peek(&mut self) -> Result<Option<&Token>, LoadError> {
         if self.peeked.is_none() {
             self.peeked = self.read()?;
         }
         Ok(self.peeked.as_ref())
     }
 
-    pub(super) fn next(&mut self) -> Result<Option<Token>, u32> {
+    pub(super) fn next(&mut self) -> Result<Option<Token>, LoadError> {
         match self.peeked.take() {
             Some(token) => Ok(Some(token)),
             None => self.read(),
         }
     }
 
-    fn read(&mut self) -> Result<Option<Token>, u32> {
+    fn read(&mut self) -> Result<Option<Token>, LoadError> {
         self.skip_space();
         let line = self.line;
         let Some(first) = self.rest.chars().next() else { return Ok(None) };
@@ -53,7 +57,8 @@ impl<'a> Tokens<'a> {
             }
             '"' => {
                 let body = &self.rest[1..];
-                let end = body.find('"').ok_or(line)?;
+                let unended = || self.place(line).bad("a quote does not end");
+                let end = body.find('"').ok_or_else(unended)?;
                 self.line += lines(&body[..end]);
                 self.rest = &body[end + 1..];
                 Kind::Text(body[..end].to_owned())
@@ -67,6 +72,10 @@ impl<'a> Tokens<'a> {
             }
         };
         Ok(Some(Token { kind, line }))
+    }
+
+    pub(super) fn place(&self, line: u32) -> Place {
+        Place::line(self.path, line)
     }
 
     fn skip_space(&mut self) {
@@ -96,7 +105,8 @@ mod tests {
     #[test]
     fn words_are_split_and_counted() {
         let text = "Shape # a \"comment\"\n\"point P\"[0, 1e-3,]\n\n\"a\nb\" end";
-        let mut tokens = Tokens::new(text);
+        let path = Path::new("a.pbrt");
+        let mut tokens = Tokens::new(path, text);
         let mut all = Vec::new();
         while let Some(token) = tokens.next().unwrap() {
             all.push((token.kind, token.line));
@@ -116,10 +126,11 @@ mod tests {
                 (word("end"), 5),
             ]
         );
-        assert_eq!(Tokens::new("\n\"open").next(), Err(2));
+        let error = Tokens::new(path, "\n\"open").next().unwrap_err();
+        assert_eq!(error.to_string(), "a.pbrt: line 2: a quote does not end");
         // A comment ends with its line, however that ends
-        let mut tokens = Tokens::new("# a\rShape # b\r\n\"x\"");
-        assert_eq!(tokens.next(), Ok(Some(Token { kind: word("Shape"), line: 2 })));
-        assert_eq!(tokens.next(), Ok(Some(Token { kind: quoted("x"), line: 3 })));
+        let mut tokens = Tokens::new(path, "# a\rShape # b\r\n\"x\"");
+        assert_eq!(tokens.next().unwrap(), Some(Token { kind: word("Shape"), line: 2 }));
+        assert_eq!(tokens.next().unwrap(), Some(Token { kind: quoted("x"), line: 3 }));
     }
 }

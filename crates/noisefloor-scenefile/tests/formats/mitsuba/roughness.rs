@@ -1,4 +1,4 @@
-use crate::util::Folder;
+use crate::util::{Folder, bsdf, float, shape_at, value};
 
 const SKY: &str = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>"#;
 
@@ -12,28 +12,24 @@ fn roughness_may_be_a_picture_and_differ_by_direction() {
             <boolean name="raw" value="true"/><string name="filter_type" value="nearest"/></texture>"#
         )
     };
-    let number = |name: &str, value: f32| format!(r#"<float name="{name}" value="{value}"/>"#);
     let sun = r#"<emitter type="directional"><vector name="direction" x="-0.3" y="0.1" z="-1"/></emitter>"#;
     let at = |x: f32, alphas: &str| {
-        folder.see(&format!(
-            r#"<shape type="rectangle"><transform name="to_world"><translate x="{x}"/></transform>
-            <bsdf type="roughconductor"><string name="distribution" value="ggx"/>{alphas}</bsdf>
-            </shape>{sun}"#
-        ))[0]
+        let metal = bsdf("roughconductor", &(value("string", "distribution", "ggx") + alphas));
+        folder.see(&(shape_at("rectangle", x, 0.0, &metal) + sun))[0]
     };
     let (left, right) = (26.0 / 255.0, 128.0 / 255.0);
     for (x, alpha) in [(0.5, left), (-0.5, right)] {
         for (mapped, plain) in [
-            (map("alpha"), number("alpha", alpha)),
-            (map("alpha_u") + &number("alpha_v", 0.3), number("alpha_u", alpha) + &number("alpha_v", 0.3)),
-            (map("alpha_v") + &number("alpha_u", 0.3), number("alpha_v", alpha) + &number("alpha_u", 0.3)),
+            (map("alpha"), float("alpha", alpha)),
+            (map("alpha_u") + &float("alpha_v", 0.3), float("alpha_u", alpha) + &float("alpha_v", 0.3)),
+            (map("alpha_v") + &float("alpha_u", 0.3), float("alpha_v", alpha) + &float("alpha_u", 0.3)),
         ] {
             let (mapped, plain) = (at(x, &mapped), at(x, &plain));
             assert!((mapped / plain - 1.0).abs() < 1e-4, "{x}: {mapped} {plain}");
         }
     }
     // The light comes along u: a lobe that is wide there shows more of it
-    let along = |u: f32, v: f32| at(0.5, &(number("alpha_u", u) + &number("alpha_v", v)));
+    let along = |u: f32, v: f32| at(0.5, &(float("alpha_u", u) + &float("alpha_v", v)));
     assert!(along(0.4, 0.1) > 2.0 * along(0.1, 0.4));
 }
 

@@ -1,4 +1,4 @@
-use crate::util::{Folder, close};
+use crate::util::{Folder, bsdf, close, rgb, value};
 
 /// Two triangles side by side with a colour at their corners, and a weight on each.
 fn folder() -> Folder {
@@ -25,11 +25,14 @@ fn mesh(bsdf: &str) -> String {
     )
 }
 
+/// The attribute `name` as the parameter `of`.
+fn texture(of: &str, name: &str, more: &str) -> String {
+    let name = value("string", "name", name);
+    format!(r#"<texture type="mesh_attribute" name="{of}">{name}{more}</texture>"#)
+}
+
 fn attribute(name: &str, more: &str) -> String {
-    format!(
-        r#"<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance"><string name="name"
-            value="{name}"/>{more}</texture></bsdf>"#
-    )
+    bsdf("diffuse", &texture("reflectance", name, more))
 }
 
 /// In a white sky, a diffuse surface shows its reflectance. The middle lies in the first triangle.
@@ -46,11 +49,10 @@ fn meshes_have_the_colours_of_their_attributes() {
     ] {
         close(folder.see(&mesh(&attribute(name, more))), want, 1e-3, name);
     }
-    let blend = r#"<bsdf type="blendbsdf"><texture type="mesh_attribute" name="weight"><string name="name"
-        value="face_weight"/></texture><bsdf type="diffuse"><rgb name="reflectance" value="0.8, 0.4, 0"/></bsdf>
-        <bsdf type="diffuse"><rgb name="reflectance" value="0, 0.4, 0.8"/></bsdf></bsdf>"#;
+    let parts = ["0.8, 0.4, 0", "0, 0.4, 0.8"].map(|colour| bsdf("diffuse", &rgb("reflectance", colour)));
+    let blend = bsdf("blendbsdf", &(texture("weight", "face_weight", "") + &parts.concat()));
     // Which part is chosen is random: 4096 samples
-    close(folder.see(&mesh(blend)), [0.6, 0.4, 0.2], 0.06, "a blend");
+    close(folder.see(&mesh(&blend)), [0.6, 0.4, 0.2], 0.06, "a blend");
 }
 
 #[test]
@@ -58,17 +60,15 @@ fn attributes_out_of_place_are_named() {
     let folder = folder();
     let outside = folder.body(&mesh(&attribute("face_weight", ""))).unwrap().warnings;
     assert!(outside[0].to_string().contains("3 values of `face_weight` are outside 0…1"), "{outside:?}");
-    let two = r#"<bsdf type="blendbsdf"><texture type="mesh_attribute" name="weight"><string name="name"
-        value="face_weight"/></texture><bsdf type="diffuse"/><bsdf type="diffuse"><texture type="mesh_attribute"
-        name="reflectance"><string name="name" value="vertex_color"/></texture></bsdf></bsdf>"#;
-    let masked = r#"<bsdf type="mask"><texture type="mesh_attribute" name="opacity"><string name="name"
-        value="face_weight"/></texture><bsdf type="diffuse"/></bsdf>"#;
+    let (grey, weight) = (bsdf("diffuse", ""), texture("weight", "face_weight", ""));
+    let two = bsdf("blendbsdf", &(weight + &grey + &attribute("vertex_color", "")));
+    let masked = bsdf("mask", &(texture("opacity", "face_weight", "") + &grey));
     let obj = mesh(&attribute("vertex_color", "")).replace("\"ply\"", "\"obj\"").replace(".ply", ".obj");
     for (body, want) in [
         (mesh(&attribute("vertex_smell", "")), "mesh.ply: the mesh has no attribute `vertex_smell`"),
         (mesh(&attribute("color", "")), "mesh.ply: the mesh has no attribute `color`"),
-        (mesh(two), "a second attribute of one mesh is not supported"),
-        (mesh(masked), "an attribute of a mesh as this parameter is not supported"),
+        (mesh(&two), "a second attribute of one mesh is not supported"),
+        (mesh(&masked), "an attribute of a mesh as this parameter is not supported"),
         (obj, "`vertex_color` of a mesh that is no PLY is not supported"),
     ] {
         let error = folder.body(&body).unwrap_err();

@@ -1,5 +1,5 @@
-use crate::materials::folder;
-use crate::util::close;
+use super::materials::{folder, picture};
+use crate::util::{bsdf, close, float};
 
 /// A ramp that rises by 1 over a quarter turn of u: where its slope lies, and which way green points, are those of
 /// Mitsuba 3.9.1. The rectangle is 2 units wide, of which a ramp of 2 pixels rises over half: a slope of `scale`
@@ -16,18 +16,11 @@ fn reliefs_turn_normals_as_in_mitsuba() {
     let light = glam::Vec3::new(1.0, 0.5, 1.0).normalize();
     let lambert =
         |n: [f32; 3]| [0.5 / std::f32::consts::PI * 3.0 * glam::Vec3::from(n).normalize().dot(light); 3];
-    let bump = |scale: f32| {
-        format!(
-            r#"<bsdf type="bumpmap"><texture type="bitmap"><string name="filename" value="ramp.exr"/>
-            <boolean name="raw" value="true"/></texture><float name="scale" value="{scale}"/>
-            <bsdf type="diffuse"/></bsdf>"#
-        )
-    };
+    let bump =
+        |scale: f32| bsdf("bumpmap", &(picture("ramp.exr") + &float("scale", scale) + &bsdf("diffuse", "")));
     for scale in [0.25, 0.5, -0.5] {
         close(lit(&bump(scale)), lambert([-scale, 0.0, 1.0]), 2e-3, &format!("bumps of {scale}"));
     }
-    let turned = r#"<bsdf type="normalmap"><texture name="normalmap" type="bitmap">
-        <string name="filename" value="turned.exr"/><boolean name="raw" value="true"/></texture>
-        <bsdf type="diffuse"/></bsdf>"#;
-    close(lit(turned), lambert([0.8, 0.0, 0.6]), 2e-3, "normals");
+    let turned = bsdf("normalmap", &(picture("turned.exr") + &bsdf("diffuse", "")));
+    close(lit(&turned), lambert([0.8, 0.0, 0.6]), 2e-3, "normals");
 }

@@ -1,4 +1,4 @@
-use crate::util::{Folder, close};
+use crate::util::{Folder, bsdf, close, float, of, ply, rgb, shape_at, value};
 
 const SKY: &str = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>"#;
 
@@ -11,15 +11,14 @@ pub(crate) fn folder() -> Folder {
         .with_exr("ramp.exr", 2, &[[0.0; 3], [1.0; 3]])
 }
 
+fn area(texture: &str) -> String {
+    of("emitter", "area", &format!("<texture name=\"radiance\" {texture}</texture>"))
+}
+
 /// The rectangle from −1 to 1 shines with a texture, and the camera sees the middle of it, which is moved to
 /// (u, v) of 0…1 from the lower left.
 fn shine(folder: &Folder, texture: &str, u: f32, v: f32) -> [f32; 3] {
-    folder.see(&format!(
-        r#"<shape type="rectangle"><transform name="to_world"><translate x="{}" y="{}"/></transform>
-            <emitter type="area"><texture name="radiance" {texture}</texture></emitter></shape>"#,
-        1.0 - 2.0 * u,
-        1.0 - 2.0 * v
-    ))
+    folder.see(&shape_at("rectangle", 1.0 - 2.0 * u, 1.0 - 2.0 * v, &area(texture)))
 }
 
 const BITMAP: &str =
@@ -92,9 +91,7 @@ fn checkerboards_lie_as_in_mitsuba() {
 #[test]
 fn mesh_files_have_their_own_ways_up() {
     let obj = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
-    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
-        property float u\nproperty float v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n\
-        -1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 0 0 1\n3 0 1 2\n3 0 2 3\n";
+    let ply = ply("u v", &["-1 -1 0 0 0", "1 -1 0 1 0", "1 1 0 1 1", "-1 1 0 0 1"], &["3 0 1 2", "3 0 2 3"]);
     let folder = folder().with("a.obj", obj).with("a.ply", ply);
     let flip = |value| format!(r#"<boolean name="flip_tex_coords" value="{value}"/>"#);
     for (file, more, want) in [
@@ -105,23 +102,15 @@ fn mesh_files_have_their_own_ways_up() {
     ] {
         for ((u, v), want) in QUARTERS.into_iter().zip(want) {
             let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
-            let got = folder.see(&format!(
-                r#"<shape type="{file}">
-                    <string name="filename" value="a.{file}"/>{more}<transform name="to_world">
-                    <translate x="{x}" y="{y}"/></transform><emitter type="area">
-                    <texture name="radiance" {BITMAP}</texture></emitter></shape>"#
-            ));
+            let name = value("string", "filename", format!("a.{file}"));
+            let got = folder.see(&shape_at(file, x, y, &(name + &more + &area(BITMAP))));
             close(got, want, 1e-3, &format!("{file} {more} {u} {v}"));
         }
     }
     // Each side of a cube has the whole picture; on +z, u runs along y and v along x
     for ((u, v), want) in QUARTERS.into_iter().zip([RED, GREEN, GREY, WHITE]) {
         let (y, x) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
-        let got = folder.see(&format!(
-            r#"<shape type="cube"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>
-                <emitter type="area"><texture name="radiance" {BITMAP}</texture></emitter></shape>"#
-        ));
-        close(got, want, 1e-3, "cube");
+        close(folder.see(&shape_at("cube", x, y, &area(BITMAP))), want, 1e-3, "cube");
     }
 }
 
@@ -147,6 +136,12 @@ fn bright_pictures_shine_and_factors_are_clamped() {
     close(folder.see(&format!("{body}{SKY}")), [1.0, 1.0, 0.5], 1e-4, body);
 }
 
+/// A picture of heights or of normals.
+pub(super) fn picture(name: &str) -> String {
+    let file = value("string", "filename", name) + &value("boolean", "raw", true);
+    format!("<texture type=\"bitmap\" name=\"normalmap\">{file}</texture>")
+}
+
 /// What the camera sees of a rectangle in a white sky, from the front and from behind.
 fn in_the_sky(folder: &Folder, bsdf: &str) -> [[f32; 3]; 2] {
     ["0", "180"].map(|angle| {
@@ -167,55 +162,26 @@ fn surfaces_reflect_a_white_sky_as_they_should() {
     let normal = |eta: f32, k: f32| ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
     let copper = [normal(0.2, 3.9), normal(0.9, 2.5), normal(1.1, 2.1)];
     let half = r#"<rgb name="reflectance" value="0.5, 0.25, 0"/>"#;
+    let none = value("string", "material", "none");
+    let black_base = bsdf("diffuse", &float("reflectance", 0.0));
     for (bsdf, front, behind) in [
         (String::new(), [0.5; 3], black),
-        (r#"<bsdf type="diffuse"/>"#.to_owned(), [0.5; 3], black),
-        (format!(r#"<bsdf type="diffuse">{half}</bsdf>"#), [0.5, 0.25, 0.0], black),
-        (
-            format!(r#"<bsdf type="twosided"><bsdf type="diffuse">{half}</bsdf></bsdf>"#),
-            [0.5, 0.25, 0.0],
-            [0.5, 0.25, 0.0],
-        ),
-        (
-            r##"<bsdf type="diffuse"><srgb name="reflectance" value="#ffff00"/></bsdf>"##.to_owned(),
-            [1.0, 1.0, 0.0],
-            black,
-        ),
-        (r#"<bsdf type="conductor"/>"#.to_owned(), white, black),
-        (r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#.to_owned(), white, black),
-        (format!(r#"<bsdf type="conductor">{metal}</bsdf>"#), copper, black),
-        (format!(r#"<bsdf type="twosided"><bsdf type="conductor">{metal}</bsdf></bsdf>"#), copper, copper),
+        (bsdf("diffuse", ""), [0.5; 3], black),
+        (bsdf("diffuse", half), [0.5, 0.25, 0.0], black),
+        (bsdf("twosided", &bsdf("diffuse", half)), [0.5, 0.25, 0.0], [0.5, 0.25, 0.0]),
+        (bsdf("diffuse", &value("srgb", "reflectance", "#ffff00")), [1.0, 1.0, 0.0], black),
+        (bsdf("conductor", ""), white, black),
+        (bsdf("conductor", &none), white, black),
+        (bsdf("conductor", metal), copper, black),
+        (bsdf("twosided", &bsdf("conductor", metal)), copper, copper),
         // F of bk7 in air, and η² fold: Mitsuba 3.9.1 has 0.467 and 2.20 with an index of 1.5
-        (r#"<bsdf type="dielectric"/>"#.to_owned(), [0.4646; 3], [2.211; 3]),
-        (
-            r#"<bsdf type="thindielectric"><string name="int_ior" value="diamond"/></bsdf>"#.to_owned(),
-            white,
-            white,
-        ),
-        (
-            r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="diffuse">
-            <float name="reflectance" value="0"/></bsdf></bsdf>"#
-                .to_owned(),
-            [0.75; 3],
-            [0.75; 3],
-        ),
-        (
-            // A height that is the same everywhere
-            r#"<bsdf type="bumpmap"><texture type="bitmap"><string name="filename" value="bright.exr"/></texture>
-            <bsdf type="diffuse"/></bsdf>"#
-                .to_owned(),
-            [0.5; 3],
-            black,
-        ),
-        (
-            // Normals turned by 53° along u: (1 + 0.6)/2 of the sky is left
-            r#"<bsdf type="normalmap"><texture name="normalmap" type="bitmap">
-            <string name="filename" value="turned.exr"/><boolean name="raw" value="true"/></texture>
-            <bsdf type="diffuse"/></bsdf>"#
-                .to_owned(),
-            [0.4; 3],
-            black,
-        ),
+        (bsdf("dielectric", ""), [0.4646; 3], [2.211; 3]),
+        (bsdf("thindielectric", &value("string", "int_ior", "diamond")), white, white),
+        (bsdf("mask", &(float("opacity", 0.25) + &black_base)), [0.75; 3], [0.75; 3]),
+        // A height that is the same everywhere
+        (bsdf("bumpmap", &(picture("bright.exr") + &bsdf("diffuse", ""))), [0.5; 3], black),
+        // Normals turned by 53° along u: (1 + 0.6)/2 of the sky is left
+        (bsdf("normalmap", &(picture("turned.exr") + &bsdf("diffuse", ""))), [0.4; 3], black),
     ] {
         let [seen, seen_behind] = in_the_sky(&folder, &bsdf);
         // 4096 samples of values in 0…1 are within 0.03 of their mean but once in 10⁴
@@ -224,34 +190,24 @@ fn surfaces_reflect_a_white_sky_as_they_should() {
     }
     // What a white coat or a rough mirror reflects of a white sky, in Mitsuba 3.9.1; how far the renderer's
     // rough coat is from that is a matter of its own tests
+    let ggx = value("string", "distribution", "ggx");
+    let diffuse = rgb("diffuse_reflectance", 1);
     for (bsdf, want, tolerance) in [
-        (r#"<bsdf type="plastic"><rgb name="diffuse_reflectance" value="1"/></bsdf>"#, 1.0, 0.05),
-        (
-            r#"<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="1"/>
-                <string name="distribution" value="ggx"/><boolean name="nonlinear" value="true"/></bsdf>"#,
-            0.910,
-            0.1,
-        ),
-        (
-            r#"<bsdf type="roughconductor"><float name="alpha" value="0.05"/>
-                <string name="distribution" value="ggx"/></bsdf>"#,
-            0.998,
-            0.05,
-        ),
+        (bsdf("plastic", &diffuse), 1.0, 0.05),
+        (bsdf("roughplastic", &(diffuse + &ggx + &value("boolean", "nonlinear", true))), 0.910, 0.1),
+        (bsdf("roughconductor", &(float("alpha", 0.05) + &ggx)), 0.998, 0.05),
     ] {
-        let [seen, behind] = in_the_sky(&folder, bsdf);
-        close(seen, [want; 3], tolerance, bsdf);
+        let [seen, behind] = in_the_sky(&folder, &bsdf);
+        close(seen, [want; 3], tolerance, &bsdf);
         assert_eq!(behind, black, "{bsdf}");
         assert_eq!(folder.body(&format!(r#"<shape type="cube">{bsdf}</shape>"#)).unwrap().warnings, []);
     }
     // A name for a metal, and the list where there is none
-    let gold =
-        in_the_sky(&folder, r#"<bsdf type="conductor"><string name="material" value="Au"/></bsdf>"#)[0];
+    let named = |name: &str| bsdf("conductor", &value("string", "material", name));
+    let gold = in_the_sky(&folder, &named("Au"))[0];
     close(gold, [normal(0.143, 3.983), normal(0.3753, 2.3856), normal(1.442, 1.6034)], 1e-3, "gold");
-    let error = folder.body(
-        r#"<shape type="cube"><bsdf type="conductor"><string name="material" value="Xx"/></bsdf></shape>"#,
-    );
-    assert!(error.unwrap_err().contains("the metal `Xx` (known: none, Ag, Al"));
+    let error = folder.body(&of("shape", "cube", &named("Xx"))).unwrap_err();
+    assert!(error.contains("the metal `Xx` (known: none, Ag, Al"), "{error}");
 }
 
 /// Roughness and metal may both vary. Red metal of α = 0.01 shows no green, red plastic shows it in its coat: 4 %
@@ -276,10 +232,7 @@ fn principled_surfaces_vary() {
         // The picture's luminance is the share of metal
         for ((u, v), share) in QUARTERS.into_iter().zip([0.2126, 0.7152, 0.2159, 1.0]) {
             let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
-            let seen = folder.see(&format!(
-                r#"<shape type="rectangle"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>
-                    {bsdf}</shape>{SKY}"#
-            ));
+            let seen = folder.see(&(shape_at("rectangle", x, y, &bsdf) + SKY));
             let metal = if warnings == 1 { 0.5359 } else { share };
             assert!((seen[1] - 0.04 * (1.0 - metal)).abs() < 0.006, "{u} {v}: {seen:?}");
         }
@@ -292,11 +245,9 @@ fn masks_take_the_luminance_of_pictures() {
     let folder = folder();
     for ((u, v), opacity) in QUARTERS.into_iter().zip([0.2126, 0.7152, 0.2159, 1.0]) {
         let (x, y) = (1.0 - 2.0 * u, 1.0 - 2.0 * v);
-        let seen = folder.see(&format!(
-            r#"<shape type="rectangle"><transform name="to_world"><translate x="{x}" y="{y}"/></transform>
-                <bsdf type="mask"><texture name="opacity" {BITMAP}</texture><bsdf type="twosided">
-                <bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf></bsdf></bsdf></shape>{SKY}"#
-        ));
+        let black = bsdf("twosided", &bsdf("diffuse", &float("reflectance", 0.0)));
+        let mask = bsdf("mask", &format!("<texture name=\"opacity\" {BITMAP}</texture>{black}"));
+        let seen = folder.see(&(shape_at("rectangle", x, y, &mask) + SKY));
         // Four standard deviations of 4096 samples
         assert!((seen[0] - (1.0 - opacity)).abs() < 0.03, "{u} {v}: {seen:?}");
     }
@@ -306,9 +257,8 @@ fn masks_take_the_luminance_of_pictures() {
 #[test]
 fn colours_in_place_of_numbers_are_their_mean() {
     let folder = folder();
-    let black = r#"<bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf>"#;
-    let white = r#"<bsdf type="diffuse"><float name="reflectance" value="1"/></bsdf>"#;
-    let rgb = |name: &str| format!(r#"<rgb name="{name}" value="0.2 0.5 0.8"/>"#);
+    let [black, white] = [0.0, 1.0].map(|albedo| bsdf("diffuse", &float("reflectance", albedo)));
+    let rgb = |name: &str| rgb(name, "0.2 0.5 0.8");
     for bsdf in [
         format!(r#"<bsdf type="mask">{}{black}</bsdf>"#, rgb("opacity")),
         format!(r#"<bsdf type="blendbsdf">{}{black}{white}</bsdf>"#, rgb("weight")),
@@ -334,36 +284,19 @@ fn colours_in_place_of_numbers_are_their_mean() {
 #[test]
 fn near_surfaces_are_warned_of() {
     let folder = folder();
-    let diffuse = r#"<bsdf type="diffuse"/>"#;
     for (bsdf, what) in [
-        (r#"<bsdf type="roughdiffuse"/>"#.to_owned(), "fast approximation"),
+        (bsdf("roughdiffuse", ""), "fast approximation"),
+        (bsdf("phong", &float("exponent", 50.0)), "Beckmann's microfacets"),
+        (bsdf("ward", ""), "Beckmann's microfacets"),
+        (bsdf("principledthin", ""), "what is seen from behind is left out"),
+        (bsdf("principled", &float("sheen", 2.0)), "`sheen` is 2, and is brought into 0…1"),
+        (bsdf("twosided", &bsdf("diffuse", "").repeat(2)), "the back of"),
+        (bsdf("coating", &bsdf("conductor", "")), "the coat of <bsdf type=\"coating\"> is left out"),
         (
-            r#"<bsdf type="phong"><float name="exponent" value="50"/></bsdf>"#.to_owned(),
-            "Beckmann's microfacets",
-        ),
-        (r#"<bsdf type="ward"/>"#.to_owned(), "Beckmann's microfacets"),
-        (r#"<bsdf type="principledthin"/>"#.to_owned(), "what is seen from behind is left out"),
-        (
-            r#"<bsdf type="principled"><float name="sheen" value="2"/></bsdf>"#.to_owned(),
-            "`sheen` is 2, and is brought into 0…1",
-        ),
-        (format!(r#"<bsdf type="twosided">{diffuse}{diffuse}</bsdf>"#), "the back of"),
-        (
-            r#"<bsdf type="coating"><bsdf type="conductor"/></bsdf>"#.to_owned(),
-            "the coat of <bsdf type=\"coating\"> is left out",
-        ),
-        (
-            r#"<bsdf type="roughplastic"><float name="alpha_u" value="0.1"/>
-                <float name="alpha_v" value="0.2"/></bsdf>"#
-                .to_owned(),
+            bsdf("roughplastic", &(float("alpha_u", 0.1) + &float("alpha_v", 0.2))),
             "roughness that varies is replaced by its mean",
         ),
-        (
-            r#"<bsdf type="conductor"><rgb name="eta" value="-0.01 1 1"/>
-                <rgb name="k" value="3 3 3"/></bsdf>"#
-                .to_owned(),
-            "brought into 0…100",
-        ),
+        (bsdf("conductor", &(rgb("eta", "-0.01 1 1") + &rgb("k", 3))), "brought into 0…100"),
     ] {
         let loaded = folder.body(&format!("<shape type=\"cube\">{bsdf}</shape>")).unwrap();
         let warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
@@ -426,9 +359,7 @@ fn spheres_and_disks_have_the_coordinates_of_mitsuba() {
 /// Blends of surfaces reflect the blend of their light.
 #[test]
 fn blends_and_mixtures_keep_their_shares() {
-    let black = r#"<bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf>"#;
-    let white = r#"<bsdf type="diffuse"><float name="reflectance" value="1"/></bsdf>"#;
-    let grey = r#"<bsdf type="diffuse"><float name="reflectance" value="0.5"/></bsdf>"#;
+    let [black, white, grey] = [0.0, 1.0, 0.5].map(|albedo| bsdf("diffuse", &float("reflectance", albedo)));
     let mixture = r#"<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.2, 0.1"/>"#;
     for (bsdf, want) in [
         (format!(r#"<bsdf type="blendbsdf"><float name="weight" value="0.25"/>{black}{white}</bsdf>"#), 0.25),

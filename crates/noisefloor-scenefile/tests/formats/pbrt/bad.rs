@@ -1,4 +1,4 @@
-use crate::util::Folder;
+use crate::util::{Folder, PINHOLE};
 use noisefloor_scenefile::LoadOptions;
 
 #[test]
@@ -83,7 +83,7 @@ fn odd_spellings_are_read_and_losses_are_named() {
     let loaded = folder.world(&format!("{lit}Shape 'sphere' 'float radius' 1,")).unwrap();
     assert_eq!(loaded.warnings, []);
     let options = "Option 'seed' 42 Option 'string msereferenceimage' 'a.exr' ColorSpace 'srgb'\n";
-    let text = format!("{options}{}WorldBegin {lit}", crate::util::CAMERA);
+    let text = format!("{options}{}WorldBegin {lit}", PINHOLE);
     let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
     assert_eq!(loaded.warnings, []);
     // What is not read is said, whatever it is a parameter of

@@ -1,65 +1,7 @@
-use crate::util::Folder;
-use noisefloor_scenefile::load;
+use crate::util::{Folder, ply};
 use noisefloor_testkit::HANG;
+use std::io::Write;
 use std::time::Instant;
-
-const SCENE: &str = "# everything
-Integrator \"path\" \"integer maxdepth\" [8] Option \"bool disablepixeljitter\" true
-LookAt 0 0 5 0 0 0 0 1 0 Scale -1 1 1
-Camera \"perspective\" \"float fov\" [40] \"float lensradius\" 0.1
-Film \"rgb\" \"integer xresolution\" [32] \"integer yresolution\" [24]
-WorldBegin
-Texture \"t\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 1 0] \"float uscale\" 4
-Texture \"a\" \"float\" \"constant\" \"float value\" 0.5
-MakeNamedMaterial \"m\" \"string type\" \"conductor\" \"spectrum eta\" \"metal-Cu-eta\" \"float roughness\" 0.2
-MakeNamedMaterial \"n\" \"string type\" \"coateddiffuse\" \"texture reflectance\" \"t\"
-MakeNamedMaterial \"x\" \"string type\" \"mix\" \"string materials\" [\"m\" \"n\"] \"float amount\" 0.4
-AttributeBegin NamedMaterial \"x\" Translate 1 2 3 Rotate 30 0 1 0
-Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point3 P\" [0 0 0 1 0 0 0 1 0] \"texture alpha\" \"a\" AttributeEnd
-ObjectBegin \"o\" Material \"dielectric\" \"float roughness\" 0.1 Shape \"sphere\" \"float radius\" 2 ObjectEnd
-ObjectInstance \"o\" ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 5 0 0 1]
-Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0]
-Shape \"disk\" \"float radius\" 2 Shape \"cylinder\"
-AreaLightSource \"diffuse\" \"blackbody L\" [5000] \"bool twosided\" true
-Shape \"sphere\" \"float radius\" 0.25
-LightSource \"infinite\" \"rgb L\" [0.1 0.2 0.3] LightSource \"spot\" \"spectrum I\" [400 1 700 2]
-";
-
-/// Changed files are scenes or errors that name the file. That they never panic is seen by this ending.
-#[test]
-fn changed_bytes_never_panic() {
-    let folder = Folder::new();
-    let path = folder.path().join("scene.pbrt");
-    std::fs::write(&path, SCENE).unwrap();
-    load(&path).unwrap();
-    let mut random = fastrand::Rng::with_seed(4);
-    let (mut broken, rounds) = (0, 2000);
-    for round in 0..rounds {
-        let mut bytes = SCENE.as_bytes().to_vec();
-        for _ in 0..1 + random.usize(..3) {
-            let at = random.usize(..bytes.len());
-            match random.usize(..5) {
-                0 => bytes[at] ^= 1 << random.usize(..8),
-                // What numbers, quotes and brackets are made of
-                1 | 2 => bytes[at] = b"0123456789-+.eE\"[]# \n"[random.usize(..21)],
-                3 => bytes.truncate(at.max(1)),
-                _ => {
-                    let end = (at + 1 + random.usize(..60)).min(bytes.len());
-                    let piece = bytes[at..end].to_vec();
-                    bytes.splice(at..at, piece);
-                }
-            }
-        }
-        std::fs::write(&path, &bytes).unwrap();
-        if let Err(error) = load(&path) {
-            broken += 1;
-            let findings: Vec<String> = error.findings().iter().map(ToString::to_string).collect();
-            assert!(findings.iter().all(|f| f.contains("scene.pbrt")), "round {round}: {findings:?}");
-        }
-    }
-    // Damage that is never noticed, or always, tests nothing
-    assert!((rounds / 4..rounds).contains(&broken), "{broken}");
-}
 
 /// What would take long or much memory is refused at once.
 #[test]
@@ -127,14 +69,9 @@ fn files_that_are_included_again_count_again() {
 /// Any number of shapes can name one gzipped mesh: what all become together is in proportion to the files.
 #[test]
 fn inflated_files_count_together() {
-    use std::io::Write;
-    let mut ply = b"ply\nformat ascii 1.0\n".to_vec();
-    ply.extend(b"element vertex 3\nproperty float x\nproperty float y\nproperty float z\n");
-    ply.extend(b"element face 1\nproperty list uchar int vertex_indices\nend_header\n");
-    ply.extend(b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2");
-    ply.extend(vec![b' '; 6 << 20]);
+    let mesh = ply("", &["0 0 0", "1 0 0", "0 1 0"], &["3 0 1 2"]) + &" ".repeat(6 << 20);
     let mut encoder = flate2::write::GzEncoder::new(vec![], flate2::Compression::default());
-    encoder.write_all(&ply).unwrap();
+    encoder.write_all(mesh.as_bytes()).unwrap();
     let folder = Folder::new().with("a.ply.gz", encoder.finish().unwrap());
     let shape = "Shape \"plymesh\" \"string filename\" \"a.ply.gz\"\n";
     folder.world(shape).unwrap();

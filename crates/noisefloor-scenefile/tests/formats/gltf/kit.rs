@@ -1,8 +1,8 @@
 //! Makes glTF files, and renders them.
 
 use gltf::json::{Value, deserialize, serialize};
-use noisefloor::{ProgressiveSource, Request, Rgb, Tile};
-use noisefloor_ptwne::{Ptwne, RenderOptions};
+use noisefloor::Rgb;
+use noisefloor_ptwne::RenderOptions;
 use noisefloor_scenefile::{LoadError, Loaded};
 use std::fmt::Write;
 use std::io::Cursor;
@@ -25,6 +25,13 @@ impl Maker {
         let mut maker = Self::empty();
         maker.push("cameras", r#"{"type": "perspective", "perspective": {"yfov": 1.5707963, "znear": 0.1}}"#);
         maker.node(r#"{"camera": 0}"#);
+        maker
+    }
+
+    /// The same with a rectangle that fills the picture, at z = −1.
+    pub(crate) fn wall(material: &str) -> Self {
+        let mut maker = Self::new();
+        maker.show([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
         maker
     }
 
@@ -102,6 +109,13 @@ impl Maker {
                     "indices": {indices}, "material": {material}}}]}}"#
             ),
         )
+    }
+
+    /// Adds such a rectangle, and a node that shows it.
+    pub(crate) fn show(&mut self, x: [f32; 2], y: [f32; 2], z: f32, material: &str) -> usize {
+        let mesh = self.rectangle(x, y, z, material);
+        self.node(&format!(r#"{{"mesh": {mesh}}}"#));
+        mesh
     }
 
     /// Adds a cube around the scene that shines with a radiance of 1, and reflects nothing.
@@ -193,10 +207,12 @@ pub(crate) fn assert_warns(loaded: &Loaded, parts: &[&str]) {
 
 /// Means of `samples` samples a pixel of paths of up to `max_depth` segments, row-major from the top left.
 pub(crate) fn render(loaded: Loaded, size: usize, samples: u64, max_depth: u32) -> Vec<Rgb> {
-    let options = RenderOptions { max_depth, seed: 5, ..RenderOptions::default() };
-    let mut source = Ptwne::new(loaded.scene, size, size, options).unwrap();
-    let tile = Tile { index: 0, x: 0, y: 0, width: size, height: size };
-    source.sample(&[Request::new(tile, 0, samples)]).unwrap().remove(0).mean
+    crate::util::render(
+        loaded,
+        [size; 2],
+        samples,
+        RenderOptions { max_depth, seed: 5, ..RenderOptions::default() },
+    )
 }
 
 /// What is seen directly of the red channel, as a drawing: `#` above ½, `.` below.

@@ -1,6 +1,5 @@
-use crate::util::{CAMERA, Folder, close, look};
-use noisefloor::{ProgressiveSource, Request, Tile};
-use noisefloor_ptwne::{FovAxis, Ptwne, RenderOptions};
+use crate::util::{Folder, PINHOLE, close, look, ply, render, seen};
+use noisefloor_ptwne::{FovAxis, RenderOptions};
 use noisefloor_scenefile::LoadOptions;
 use std::f32::consts::PI;
 
@@ -53,12 +52,7 @@ fn pictures_are_not_mirrored() {
 /// Bumps, normal maps and subdivided meshes.
 #[test]
 fn relief_and_subdivision_shape_what_is_lit() {
-    let exr = |pixels: &[[f32; 3]]| {
-        let folder = Folder::new();
-        let layers = noisefloor_image::RenderLayers::rgb(pixels.len(), 1, pixels);
-        noisefloor_image::write_exr(folder.path().join("a.exr"), &layers).unwrap();
-        folder
-    };
+    let exr = |pixels: &[[f32; 3]]| Folder::new().with_exr("a.exr", pixels.len(), pixels);
     // From +x +z onto the square, whose u runs along +x over 2 units
     let sun = "LightSource 'distant' 'rgb L' [3 3 3] 'point3 from' [1 0 1] 'point3 to' [0 0 0]\n";
     let square = SQUARE.replace("'point3 P'", "'point2 uv' [0 0 1 0 1 1 0 1] 'point3 P'");
@@ -196,11 +190,11 @@ fn lights_have_the_units_of_pbrt() {
     assert!((0.2126 * r + 0.7152 * g + 0.0722 * b - 2.0).abs() < 1e-3 && r > g && g > b, "{r} {g} {b}");
     // The film's exposure counts for all
     let text = format!(
-        "{CAMERA}Film 'rgb' 'float iso' 200 'integer xresolution' 4 'integer yresolution' 3 WorldBegin {LIGHT}{SQUARE}"
+        "{PINHOLE}Film 'rgb' 'float iso' 200 'integer xresolution' 4 'integer yresolution' 3 WorldBegin {LIGHT}{SQUARE}"
     );
     let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
     assert_eq!(loaded.size, Some((4, 3)));
-    close(look(loaded, 1)[0], [2.0, 4.0, 6.0], 1e-3, "iso");
+    close(seen(loaded), [2.0, 4.0, 6.0], 1e-3, "iso");
 }
 
 #[test]
@@ -245,8 +239,7 @@ fn instances_share_their_object() {
 #[test]
 fn other_files_are_read() {
     use std::io::Write;
-    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-        element face 1\nproperty list uchar int vertex_indices\nend_header\n-9 -9 0\n9 -9 0\n0 9 0\n3 0 1 2\n";
+    let ply = ply("", &["-9 -9 0", "9 -9 0", "0 9 0"], &["3 0 1 2"]);
     let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     gz.write_all(ply.as_bytes()).unwrap();
     let folder = Folder::new()
@@ -263,9 +256,7 @@ fn other_files_are_read() {
 #[test]
 fn maps_lie_as_in_pbrt() {
     let columns: Vec<[f32; 3]> = (0..8 * 4).map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
-    let layers = noisefloor_image::RenderLayers::rgb(8, 4, &columns);
-    let folder = Folder::new();
-    noisefloor_image::write_exr(folder.path().join("sky.exr"), &layers).unwrap();
+    let folder = Folder::new().with_exr("sky.exr", 8, &columns);
     let sky = |more: &str| format!("{more} LightSource 'infinite' 'string filename' 'sky.exr'");
     // The camera looks along −z: the bottom row
     let down = folder.see(&sky(""));
@@ -288,14 +279,12 @@ fn windows_are_parts_of_the_picture() {
             Film 'image' 'integer xresolution' 40 'integer yresolution' 30 {film} WorldBegin
             AreaLightSource 'diffuse' Translate -0.9 0.5 0 Shape 'sphere' 'float radius' 0.4"
         );
-        let loaded = folder.load_with(&text, &LoadOptions::default()).unwrap();
-        (loaded.size.unwrap(), loaded.scene)
+        folder.load_with(&text, &LoadOptions::default()).unwrap()
     };
     let lit = |film: &str| {
-        let ((width, height), scene) = picture(film);
-        let mut source = Ptwne::new(scene, width, height, RenderOptions::default()).unwrap();
-        let tile = Tile { index: 0, x: 0, y: 0, width, height };
-        let mean = source.sample(&[Request::new(tile, 0, 64)]).unwrap().remove(0).mean;
+        let loaded = picture(film);
+        let (width, height) = loaded.size.unwrap();
+        let mean = render(loaded, [width, height], 64, RenderOptions::default());
         (width, height, mean.iter().map(|p| p[0]).collect::<Vec<f32>>())
     };
     let (_, _, whole) = lit("");
@@ -324,9 +313,7 @@ fn lamps_of_nothing_shine() {
 /// right.
 #[test]
 fn roughness_may_be_a_picture() {
-    let folder = Folder::new();
-    let image = image::RgbImage::from_fn(2, 1, |x, _| image::Rgb([if x == 0 { 26 } else { 204 }; 3]));
-    image.save(folder.path().join("r.png")).unwrap();
+    let folder = Folder::new().with_png("r.png", 2, &[[26, 26, 26, 255], [204, 204, 204, 255]]);
     let map = "Texture 'r' 'float' 'imagemap' 'string filename' 'r.png' 'string filter' 'point'
         'string encoding' 'linear'";
     let quad = "Shape 'trianglemesh' 'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
@@ -351,11 +338,9 @@ fn roughness_may_be_a_picture() {
 /// Without coordinates, the corners of a triangle have (0, 0), (1, 0) and (1, 1), as in pbrt.
 #[test]
 fn triangles_without_coordinates_are_mapped_by_their_corners() {
-    let folder = Folder::new();
     // White is left and below
-    let image =
-        image::RgbImage::from_fn(2, 2, |x, y| image::Rgb(if x == 0 && y == 1 { [255; 3] } else { [0; 3] }));
-    image.save(folder.path().join("a.png")).unwrap();
+    let (black, white) = ([0, 0, 0, 255], [255; 4]);
+    let folder = Folder::new().with_png("a.png", 2, &[black, black, white, black]);
     let seen = |x: f32, y: f32| {
         folder.see(&format!(
             "Texture 'a' 'spectrum' 'imagemap' 'string filename' 'a.png' 'string filter' 'point'
@@ -508,12 +493,12 @@ fn metals_and_glasses_are_those_that_pbrt_names() {
 fn samples_are_bounded_as_the_film_says() {
     let film = "Film 'rgb' 'float maxcomponentvalue' 2\n";
     let light = "AreaLightSource 'diffuse' 'rgb L' [8 1 1]\n";
-    let text = |film: &str| format!("{CAMERA}{film}WorldBegin {light}{SQUARE}");
+    let text = |film: &str| format!("{PINHOLE}{film}WorldBegin {light}{SQUARE}");
     let load = |film: &str| Folder::new().load_with(&text(film), &LoadOptions::default());
     let loaded = load(film).unwrap();
     assert_eq!((loaded.clamp, loaded.warnings.len()), (Some(2.0), 1));
-    close(look(loaded, 1)[0], [2.0, 0.25, 0.25], 1e-4, film);
-    close(look(load("").unwrap(), 1)[0], [8.0, 1.0, 1.0], 1e-4, "no film");
+    close(seen(loaded), [2.0, 0.25, 0.25], 1e-4, film);
+    close(seen(load("").unwrap()), [8.0, 1.0, 1.0], 1e-4, "no film");
     let error = load("Film 'rgb' 'float maxcomponentvalue' 0\n").unwrap_err();
     assert!(error.contains("`maxcomponentvalue` must be above 0"), "{error}");
 }
@@ -527,12 +512,10 @@ fn files_are_read_in_any_text_or_named() {
     close(folder.see(&world.replace('\n', "\r\n")), [1.0, 2.0, 3.0], 1e-4, "CRLF");
     let wide: Vec<u8> =
         "\u{feff}".encode_utf16().chain(world.encode_utf16()).flat_map(u16::to_be_bytes).collect();
-    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
     let folder = Folder::new()
         .with("wide.pbrt", wide)
         .with("latin.pbrt", [b"# caf\xe9\n".as_slice(), world.as_bytes()].concat())
-        .with("pointer.pbrt", pointer)
-        .with("pointer.ply", pointer)
+        .with("pointer.pbrt", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
         .with(
             "points.ply",
             "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
@@ -543,7 +526,6 @@ fn files_are_read_in_any_text_or_named() {
     }
     for (world, want) in [
         ("Include 'pointer.pbrt'", "pointer.pbrt: this is a Git LFS pointer"),
-        ("Shape 'plymesh' 'string filename' 'pointer.ply'", "pointer.ply: this is a Git LFS pointer"),
         ("Shape 'plymesh' 'string filename' 'points.ply'", "points.ply: the PLY file has no faces"),
     ] {
         let error = folder.world(world).unwrap_err();
@@ -603,18 +585,14 @@ fn lights_have_the_power_that_is_asked_for() {
         let loaded = folder.world(&format!("{light}{shape}")).unwrap();
         let said = loaded.warnings.iter().any(|w| w.what.contains("where pbrt gives it to each"));
         assert_eq!(said, shape == SQUARE, "{shape}: {:?}", loaded.warnings);
-        close(look(loaded, 1)[0], [10.0 / (PI * area * sides); 3], 0.01, shape);
+        close(seen(loaded), [10.0 / (PI * area * sides); 3], 0.01, shape);
     }
 }
 
 /// Light that is a picture on a shape: its codes are sRGB, its first row is at v = 1, and its mean has the power.
 #[test]
 fn area_lights_show_pictures() {
-    let mut picture = image::RgbImage::from_pixel(1, 2, image::Rgb([255; 3]));
-    picture.put_pixel(0, 1, image::Rgb([188, 0, 0]));
-    let mut png = std::io::Cursor::new(vec![]);
-    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
-    let folder = Folder::new().with("a.png", png.into_inner());
+    let folder = Folder::new().with_png("a.png", 1, &[[255; 4], [188, 0, 0, 255]]);
     let red = ((188.0f32 / 255.0 + 0.055) / 1.055).powf(2.4);
     // The camera looks at the middle: the upper half of the picture above it, and the lower below
     let at = |y: f32, more: &str| {
@@ -761,9 +739,7 @@ fn textures_are_made_of_their_operands() {
 /// `Attribute` gives parameters to all that come (scene.cpp 185-200 and 247-734 of pbrt-v4), which their own outdo.
 #[test]
 fn attributes_are_for_all_that_comes() {
-    let white = image::RgbImage::from_pixel(1, 1, image::Rgb([255; 3]));
-    let folder = Folder::new();
-    white.save(folder.path().join("w.png")).unwrap();
+    let folder = Folder::new().with_png("w.png", 1, &[[255; 4]]);
     let grey = "Attribute 'material' 'rgb reflectance' [.2 .2 .2]\n";
     for (world, want) in [
         (format!("{SKY}{grey}Material 'diffuse' {SQUARE}"), 0.2),
@@ -793,7 +769,7 @@ fn attributes_are_for_all_that_comes() {
     ] {
         let loaded = folder.world(&world).unwrap_or_else(|e| panic!("{world}: {e}"));
         assert_eq!(loaded.warnings, [], "{world}");
-        close(look(loaded, 1)[0], [want; 3], 2e-3, &world);
+        close(seen(loaded), [want; 3], 2e-3, &world);
     }
     let error = folder.world("Attribute 'materials' 'rgb reflectance' [.2 .2 .2]").unwrap_err();
     assert!(

@@ -1,4 +1,4 @@
-use crate::util::{CAMERA, Folder, close, look};
+use crate::util::{CAMERA, Folder, close, seen};
 use noisefloor_ptwne::FovAxis;
 
 fn sensor(version: &str, inside: &str) -> Result<noisefloor_scenefile::Loaded, String> {
@@ -38,59 +38,21 @@ fn fields_of_view_are_those_of_mitsuba() {
 }
 
 /// The columns left, up, view and eye of transforms, as Mitsuba 3.9.1 has them.
-// Long: a list of cases
 #[test]
 fn transforms_are_those_of_mitsuba() {
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let up = [-0.507_093, 0.845_154, -0.169_031];
+    let view = [0.801_784, 0.534_522, 0.267_261];
+    let eye = [1.0, 2.0, 3.0];
+    let moved = r#"<scale value="2"/><matrix value="0 0 1 5, 1 0 0 6, 0 1 0 7, 0 0 0 1"/>"#;
     for (version, steps, up, view, eye) in [
-        (
-            "3.0.0",
-            r#"<rotate y="1" angle="90"/><translate x="1"/>"#,
-            [0.0, 1.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [1.0, 0.0, 0.0],
-        ),
-        (
-            "3.0.0",
-            r#"<translate x="1"/><rotate value="0 1 0" angle="90"/>"#,
-            [0.0, 1.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [0.0, 0.0, -1.0],
-        ),
-        (
-            "3.0.0",
-            r#"<lookat origin="1,2,3" target="4,4,4" up="0,1,0"/>"#,
-            [-0.507_093, 0.845_154, -0.169_031],
-            [0.801_784, 0.534_522, 0.267_261],
-            [1.0, 2.0, 3.0],
-        ),
-        (
-            "0.6.0",
-            r#"<lookAt origin="1 2 3" target="4 4 4" up="0 1 0"/>"#,
-            [-0.507_093, 0.845_154, -0.169_031],
-            [0.801_784, 0.534_522, 0.267_261],
-            [1.0, 2.0, 3.0],
-        ),
-        (
-            "3.0.0",
-            r#"<translate value="1 2 3"/><translate value="1"/>"#,
-            [0.0, 1.0, 0.0],
-            [0.0, 0.0, 1.0],
-            [2.0, 3.0, 4.0],
-        ),
-        (
-            "3.0.0",
-            r#"<scale value="2"/><matrix value="0 0 1 5, 1 0 0 6, 0 1 0 7, 0 0 0 1"/>"#,
-            [0.0, 0.0, 1.0],
-            [1.0, 0.0, 0.0],
-            [5.0, 6.0, 7.0],
-        ),
-        (
-            "3.0.0",
-            r#"<matrix value="0 0 1 1 0 0 0 1 0"/>"#,
-            [0.0, 0.0, 1.0],
-            [1.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0],
-        ),
+        ("3.0.0", r#"<rotate y="1" angle="90"/><translate x="1"/>"#, y, x, x),
+        ("3.0.0", r#"<translate x="1"/><rotate value="0 1 0" angle="90"/>"#, y, x, [0.0, 0.0, -1.0]),
+        ("3.0.0", r#"<lookat origin="1,2,3" target="4,4,4" up="0,1,0"/>"#, up, view, eye),
+        ("0.6.0", r#"<lookAt origin="1 2 3" target="4 4 4" up="0 1 0"/>"#, up, view, eye),
+        ("3.0.0", r#"<translate value="1 2 3"/><translate value="1"/>"#, y, z, [2.0, 3.0, 4.0]),
+        ("3.0.0", moved, z, x, [5.0, 6.0, 7.0]),
+        ("3.0.0", r#"<matrix value="0 0 1 1 0 0 0 1 0"/>"#, z, x, [0.0; 3]),
     ] {
         let name = if version == "3.0.0" { "to_world" } else { "toWorld" };
         let camera =
@@ -230,13 +192,6 @@ fn references_may_come_first_and_must_not_go_round() {
             .unwrap_err()
             .contains("taken already")
     );
-    let chain: String = (0..10_000)
-        .map(|i| format!(r#"<bsdf type="twosided" id="{i}"><ref id="{}"/></bsdf>"#, i + 1))
-        .collect();
-    let error = folder.body(&format!(
-        r#"{chain}<bsdf type="diffuse" id="10000"/><shape type="cube"><ref id="0"/></shape>"#
-    ));
-    assert!(error.unwrap_err().contains("17 nested surfaces and textures, more than 16"));
     // In a texture that is referred to, what is not read is warned of
     let texture = r#"<texture type="checkerboard" id="t"><float name="x" value="1"/></texture>
         <shape type="cube"><bsdf type="diffuse"><ref name="reflectance" id="t"/></bsdf></shape>"#;
@@ -258,14 +213,14 @@ fn old_names_are_read_in_old_files() {
     let folder = Folder::new();
     let old = folder.load(&scene("0.5.0", "toWorld", "flipNormals")).unwrap();
     assert_eq!(old.warnings, []);
-    assert_eq!(look(old), [0.0; 3]);
+    assert_eq!(seen(old), [0.0; 3]);
     let new = folder.load(&scene("2.1.0", "to_world", "flip_normals")).unwrap();
-    assert_eq!(look(new), [0.0; 3]);
+    assert_eq!(seen(new), [0.0; 3]);
     // In files of version 3, the names of 0.5 are no names
     let neither = folder.load(&scene("3.0.0", "to_world", "flipNormals")).unwrap();
     assert!(neither.warnings[0].to_string().contains("<boolean name=\"flipNormals\"> is ignored"));
     // A spectrum of equal energy is not white in Rec.709; Mitsuba 3.9.1 takes old files for that, too
-    close(look(neither), [2.4096, 1.8966, 1.8178], 1e-4, "spectrum");
+    close(seen(neither), [2.4096, 1.8966, 1.8178], 1e-4, "spectrum");
     let old = folder.load(&scene("0.6.0", "toWorld", "unheardOf")).unwrap();
-    close(look(old), [2.4096, 1.8966, 1.8178], 1e-4, "old spectrum");
+    close(seen(old), [2.4096, 1.8966, 1.8178], 1e-4, "old spectrum");
 }

@@ -1,7 +1,7 @@
 //! Extensions, normal maps and colours of vertices, in closed form; and daylight.
 
-use crate::kit::{Maker, assert_warns, json, render};
-use crate::materials::{assert_close, linear, mean, near, wall};
+use super::kit::{Maker, assert_warns, json, render};
+use super::materials::{assert_close, linear, mean, near, wall};
 use noisefloor_scenefile::Loaded;
 
 /// A distant light along −z: what a wall of normal n reflects of it is Lambert's cosine.
@@ -170,10 +170,7 @@ fn specular_and_glossy_become_metal_and_rough() {
 #[test]
 fn what_glows_a_little_does_not_light_the_scene() {
     let warns = |material: &str| {
-        let mut maker = Maker::new();
-        let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
-        maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
-        maker.load().unwrap().warnings.iter().any(|w| w.what.contains("a grey sky"))
+        Maker::wall(material).load().unwrap().warnings.iter().any(|w| w.what.contains("a grey sky"))
     };
     assert!(warns("{}"));
     assert!(warns(r#"{"emissiveFactor": [0.001, 0.001, 0.001]}"#));
@@ -185,18 +182,15 @@ fn what_glows_a_little_does_not_light_the_scene() {
     assert!(!warns(r#"{"extensions": {"KHR_materials_unlit": {}}}"#));
 
     // A headlight, however bright, shows too little of the wall that it is on
-    let mut maker = Maker::new();
-    let wall = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, "{}");
-    maker.node(&format!(r#"{{"mesh": {wall}}}"#));
-    let lamp = maker.rectangle(
+    let mut maker = Maker::wall("{}");
+    let lamp = maker.show(
         [-0.1, 0.1],
         [-0.1, 0.1],
         -0.999,
         r#"{"emissiveFactor": [1, 1, 1],
             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 20}}}"#,
     );
-    maker.node(&format!(r#"{{"mesh": {lamp}}}"#));
-    crate::kit::assert_warns(&maker.load().unwrap(), &["its own lights show next to nothing", "a grey sky"]);
+    super::kit::assert_warns(&maker.load().unwrap(), &["its own lights show next to nothing", "a grey sky"]);
     // In front of it, and turned to it, it is a lamp
     let turned = r#", "rotation": [0, 1, 0, 0], "translation": [0, 0, -1.2]"#;
     maker.root["nodes"].as_array_mut().unwrap().pop();
@@ -394,8 +388,7 @@ fn plain_pictures_have_limits() {
             maker.push("textures", &format!(r#"{{"source": {index}}}"#));
             let material =
                 format!(r#"{{"emissiveFactor": [1, 1, 1], "emissiveTexture": {{"index": {index}}}}}"#);
-            let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, &material);
-            maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+            maker.show([-1.0, 1.0], [-1.0, 1.0], -1.0, &material);
         }
         maker.load()
     };
@@ -416,8 +409,7 @@ fn textures_without_images_are_left_out() {
     maker.push("textures", "{}");
     let material =
         r#"{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}, "normalTexture": {"index": 0}}"#;
-    let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
-    maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    maker.show([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
     let loaded = maker.load().unwrap();
     assert_warns(&loaded, &["texture 0: ", "it names no image: it is white"]);
     assert_warns(&loaded, &["material 0: ", "its normal map names no image: it is left out"]);

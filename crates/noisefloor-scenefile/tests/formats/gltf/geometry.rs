@@ -1,7 +1,7 @@
 //! Where triangles and cameras are. A lamp is drawn as it is seen directly: its place in the image says where
 //! it is.
 
-use crate::kit::{Maker, assert_warns, drawing, json, load};
+use super::kit::{Maker, assert_warns, drawing, json, load};
 
 /// Shines to the front.
 const LAMP: &str = r#"{"emissiveFactor": [1, 1, 1]}"#;

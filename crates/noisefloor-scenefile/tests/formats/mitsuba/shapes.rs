@@ -1,16 +1,14 @@
-use crate::util::{CAMERA, Folder, close, look};
+use crate::util::{CAMERA, Folder, close, ply, seen, shape_at};
 
 const LIGHT: &str = r#"<emitter type="area"><rgb name="radiance" value="1, 2, 3"/></emitter>"#;
 
 fn folder() -> Folder {
     let with_normals = "v -9 -9 0\nv 9 -9 0\nv 0 9 0\nvn 0 0.6 0.8\nf 1//1 2//1 3//1\n";
-    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-        element face 1\nproperty list uchar int vertex_indices\nend_header\n-9 -9 0\n9 -9 0\n0 9 0\n3 0 1 2\n";
     Folder::new()
         .with("bare.obj", "v -9 -9 0\nv 9 -9 0\nv 0 9 0\nf 1 2 3\n")
         .with("normals.obj", with_normals)
         .with("backwards.obj", with_normals.replace("0.8", "-0.8"))
-        .with("bare.ply", ply)
+        .with("bare.ply", ply("", &["-9 -9 0", "9 -9 0", "0 9 0"], &["3 0 1 2"]))
 }
 
 /// Which side shines, as Mitsuba 3.9.1 has it: from shading normals where there are any, from the corners
@@ -78,13 +76,7 @@ fn fronts_are_those_of_mitsuba() {
 #[test]
 fn shapes_have_the_sizes_of_mitsuba() {
     let folder = Folder::new();
-    let moved = |shape: &str, x: f32, y: f32| {
-        let body = format!(
-            r#"<shape type="{shape}"><transform name="to_world"><translate x="{x}" y="{y}"/>
-                </transform>{LIGHT}</shape>"#
-        );
-        folder.see(&body) == [1.0, 2.0, 3.0]
-    };
+    let moved = |shape: &str, x: f32, y: f32| folder.see(&shape_at(shape, x, y, LIGHT)) == [1.0, 2.0, 3.0];
     for (shape, x, y, seen) in [
         ("rectangle", 0.99, -0.99, true),
         ("rectangle", 1.01, 0.0, false),
@@ -240,8 +232,7 @@ fn instances_share_their_group() {
 /// Mitsuba: u grows to the second, and the picture's rows run to the third.
 #[test]
 fn meshes_without_coordinates_are_mapped_by_their_corners() {
-    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n4 0 0\n0 4 0\n3 0 1 2\n";
+    let ply = ply("", &["0 0 0", "4 0 0", "0 4 0"], &["3 0 1 2"]);
     let pixels = [[0, 0, 0, 255], [255, 0, 0, 255], [0, 255, 0, 255], [255, 255, 0, 255]];
     let folder = Folder::new().with("a.ply", ply).with_png("a.png", 2, &pixels);
     for (x, y, want) in
@@ -287,30 +278,25 @@ fn long_axes_stretch_as_in_mitsuba_3() {
         "{warnings:?}"
     );
     let old = format!("<scene version=\"0.6.0\">{CAMERA}\n{body}</scene>").replace("to_world", "toWorld");
-    close(look(folder.load(&old).unwrap()), [0.0; 3], 1e-4, "ends at x = −0.5");
+    close(seen(folder.load(&old).unwrap()), [0.0; 3], 1e-4, "ends at x = −0.5");
 }
 
 /// A black U of one polygon before a white sky, over [−1, 1]²: it covers 1 − 0.5·0.75 = 0.625 of 4. Five
 /// standard errors are 5·√(0.156·0.844/4096) = 0.028; a fan from its first corner would cover 0.052 more.
 #[test]
 fn concave_polygons_cover_what_they_enclose() {
-    let corners = [
-        [-0.5, -0.5],
-        [0.5, -0.5],
-        [0.5, 0.5],
-        [0.25, 0.5],
-        [0.25, -0.25],
-        [-0.25, -0.25],
-        [-0.25, 0.5],
-        [-0.5, 0.5],
+    let rows = [
+        "-0.5 -0.5 0",
+        "0.5 -0.5 0",
+        "0.5 0.5 0",
+        "0.25 0.5 0",
+        "0.25 -0.25 0",
+        "-0.25 -0.25 0",
+        "-0.25 0.5 0",
+        "-0.5 0.5 0",
     ];
-    let rows: Vec<String> = corners.iter().map(|[x, y]: &[f32; 2]| format!("{x} {y} 0\n")).collect();
-    let obj = rows.iter().map(|row| format!("v {row}")).collect::<String>() + "f 1 2 3 4 5 6 7 8\n";
-    let ply = format!(
-        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
-         element face 1\nproperty list uchar int vertex_indices\nend_header\n{}8 0 1 2 3 4 5 6 7\n",
-        rows.concat()
-    );
+    let obj = rows.iter().map(|row| format!("v {row}\n")).collect::<String>() + "f 1 2 3 4 5 6 7 8\n";
+    let ply = ply("", &rows, &["8 0 1 2 3 4 5 6 7"]);
     let folder = Folder::new().with("u.obj", obj).with("u.ply", ply);
     let sensor = CAMERA.replace("perspective", "orthographic").replace(
         r#"<float name="fov" value="0.1"/>"#,
@@ -322,7 +308,7 @@ fn concave_polygons_cover_what_they_enclose() {
             <shape type="{kind}"><string name="filename" value="u.{kind}"/><bsdf type="twosided"><bsdf type="diffuse">
             <rgb name="reflectance" value="0"/></bsdf></bsdf></shape></scene>"#
         );
-        let [seen, ..] = look(folder.load(&scene).unwrap());
-        assert!((seen - 0.84375).abs() < 0.028, "{kind}: {seen}");
+        let [shown, ..] = seen(folder.load(&scene).unwrap());
+        assert!((shown - 0.84375).abs() < 0.028, "{kind}: {shown}");
     }
 }

@@ -3,7 +3,7 @@
 //! A bumpy square of 3×3 vertices, encoded three times by DracoPy 2.2.0, which is Google's Draco: positions of 11
 //! bits, normals of 8, texture coordinates of 10, colours of bytes.
 
-use crate::kit::{Maker, json, render};
+use super::kit::{Maker, json, render};
 use noisefloor::Rgb;
 
 /// Edgebreaker with valences, level 10.

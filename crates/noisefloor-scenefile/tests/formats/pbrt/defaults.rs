@@ -1,9 +1,9 @@
 //! What pbrt takes where a parameter is not given: pbrt-v4 5f7a606 and pbrt-v3 13d871f, the `Create` of each thing.
 
-use crate::util::Folder;
-use noisefloor::{ProgressiveSource, Request, Rgb, TileGrid};
-use noisefloor_ptwne::{Ptwne, RenderOptions};
-use noisefloor_scenefile::{LoadOptions, Loaded};
+use crate::util::{Folder, render};
+use noisefloor::Rgb;
+use noisefloor_ptwne::RenderOptions;
+use noisefloor_scenefile::LoadOptions;
 
 /// A view of the origin from aside, and lights from there and from all around.
 const VIEW: &str = "LookAt 2 3 4  0 0 0  0 0 1 Camera 'perspective' 'float fov' 40\n";
@@ -17,11 +17,9 @@ const SQUARE: &str = "Shape 'trianglemesh' 'integer indices' [0 1 2 0 2 3] \
 /// What a directive with `{}` shows, before and after it other ones.
 fn sketch(folder: &Folder, text: &str) -> (Vec<Rgb>, Option<(usize, usize)>, Option<u32>) {
     let loaded = folder.load_with(text, &LoadOptions::default()).unwrap_or_else(|e| panic!("{text}: {e}"));
-    let Loaded { scene, size, max_depth, clamp, .. } = loaded;
-    let options = RenderOptions { clamp, max_depth: 4, ..RenderOptions::default() };
-    let mut source = Ptwne::new(scene, 12, 12, options).unwrap();
-    let tile = TileGrid::new(12, 12, 64).unwrap().tile(0);
-    (source.sample(&[Request::new(tile, 0, 16)]).unwrap().remove(0).mean, size, max_depth)
+    let (size, max_depth) = (loaded.size, loaded.max_depth);
+    let options = RenderOptions { clamp: loaded.clamp, max_depth: 4, ..RenderOptions::default() };
+    (render(loaded, [12; 2], 16, options), size, max_depth)
 }
 
 /// In `text`, a parameter that has its default changes nothing, and one that has another value does: else the row

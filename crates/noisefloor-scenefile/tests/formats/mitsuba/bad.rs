@@ -1,4 +1,4 @@
-use crate::util::{CAMERA, Folder};
+use crate::util::{CAMERA, Folder, close, ply, seen, serialized};
 
 const RECTANGLE: &str = r#"<shape type="rectangle"/>"#;
 
@@ -8,13 +8,7 @@ fn folder() -> Folder {
         .with("text.png", "not a picture")
         .with("empty.obj", "")
         .with("curves.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\ncurv 0 1 1 2\n")
-        .with(
-            "empty.ply",
-            "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n\
-             element face 0\nproperty list uchar int vertex_indices\nend_header\n",
-        )
-        .with("pointer.obj", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
-        .with("pointer.png", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+        .with("empty.ply", ply("", &[], &[]))
         .with("page.obj", "\n<!DOCTYPE html>\n<html><body>404</body></html>\n")
         .with("bad.obj", "v 0 0 0\nf 1 2 3\n")
         .with("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 1 2\nf 1 2 2\n")
@@ -71,11 +65,11 @@ fn move_by(inside: &str) -> String {
 fn missing_and_broken_files_are_named() {
     let outside = if cfg!(windows) { "C:\\x.png" } else { "/etc/hostname" };
     all_fail(&[
-        (bitmap("missing.png"), "scene.xml: line 3 cannot be read: `"),
+        (bitmap("missing.png"), "scene.xml: line 3: cannot be read: `"),
         (bitmap("../good.png"), "scene.xml: line 3: `../good.png` lies outside the folder of the scene"),
         (bitmap("a/../../good.png"), "lies outside the folder of the scene"),
         (bitmap(outside), "lies outside the folder of the scene"),
-        (bitmap("."), "line 3 cannot be read: `"),
+        (bitmap("."), "line 3: cannot be read: `"),
         (bitmap("broken.png"), "broken.png: the picture is broken"),
         (
             bitmap("text.png"),
@@ -85,19 +79,11 @@ fn missing_and_broken_files_are_named() {
         (mesh("obj", "bad.obj"), "bad.obj: line 2: `2`: there is no position 2"),
         (mesh("ply", "short.ply"), "short.ply: the header asks for more elements than the file holds"),
         (mesh("serialized", "bad.serialized"), "bad.serialized: mesh 0: the file is cut short"),
-        (mesh("obj", "missing.obj"), "line 3 cannot be read"),
+        (mesh("obj", "missing.obj"), "line 3: cannot be read"),
         (mesh("obj", "empty.obj"), "empty.obj: the OBJ file has no faces"),
-        (
-            mesh("obj", "pointer.obj"),
-            "pointer.obj: this is a Git LFS pointer, not the file itself: run `git lfs pull`",
-        ),
-        (
-            bitmap("pointer.png"),
-            "pointer.png: this is a Git LFS pointer, not the file itself: run `git lfs pull`",
-        ),
         (mesh("obj", "page.obj"), "page.obj: this is a web page (HTML), not the file itself"),
         ("<shape type='obj'/>".to_owned(), "line 2: <shape type=\"obj\"> needs a `filename`"),
-        (format!("<include filename='b.xml'/>{RECTANGLE}"), "line 2 cannot be read"),
+        (format!("<include filename='b.xml'/>{RECTANGLE}"), "line 2: cannot be read"),
     ]);
 }
 
@@ -437,6 +423,23 @@ fn xml_is_read_as_mitsuba_reads_it() {
         let folder = Folder::new().with("a.xml", &bytes);
         let loaded = noisefloor_scenefile::load(&folder.path().join("a.xml"));
         let loaded = loaded.unwrap_or_else(|e| panic!("{}: {e}", String::from_utf8_lossy(&bytes)));
-        crate::util::close(crate::util::look(loaded), [0.5; 3], 1e-4, &String::from_utf8_lossy(&bytes));
+        close(seen(loaded), [0.5; 3], 1e-4, &String::from_utf8_lossy(&bytes));
     }
+}
+
+/// Any number of shapes can name one mesh that inflates a thousandfold: all together are in proportion to the files.
+#[test]
+fn inflated_meshes_count_together() {
+    let vertices = 1 << 19;
+    let mut inside = 0x1000u32.to_le_bytes().to_vec();
+    inside.extend(b"\0");
+    inside.extend([vertices as u64, 1].map(u64::to_le_bytes).concat());
+    inside.extend(vec![0; 12 * vertices]);
+    inside.extend([0u32, 1, 2].map(u32::to_le_bytes).concat());
+    let bytes = serialized(4, &inside);
+    assert!(bytes.len() < 10_000);
+    let shape = r#"<shape type="serialized"><string name="filename" value="mesh.serialized"/></shape>"#;
+    let folder = Folder::new().with("mesh.serialized", bytes);
+    let error = folder.body(&shape.repeat(40)).unwrap_err();
+    assert!(error.contains("inflated bytes so far, more than"), "{error}");
 }

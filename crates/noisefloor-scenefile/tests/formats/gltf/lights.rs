@@ -1,6 +1,6 @@
 //! Lights without size, over a floor that is almost Lambertian.
 
-use crate::kit::{Maker, assert_warns, render};
+use super::kit::{Maker, assert_warns, render};
 use std::f32::consts::PI;
 
 pub(crate) const ALBEDO: f32 = 0.6;
@@ -21,7 +21,7 @@ pub(crate) fn floor(light: &str, node: &str) -> Maker {
         ),
     );
     maker.node(&format!(r#"{{"mesh": {floor}, "rotation": [-0.70710678, 0, 0, 0.70710678]}}"#));
-    maker.root["extensions"]["KHR_lights_punctual"]["lights"] = crate::kit::json(&format!("[{light}]"));
+    maker.root["extensions"]["KHR_lights_punctual"]["lights"] = super::kit::json(&format!("[{light}]"));
     maker.node(&format!(r#"{{{node}, "extensions": {{"KHR_lights_punctual": {{"light": 0}}}}}}"#));
     maker
 }

@@ -1,5 +1,5 @@
-use crate::util::{CAMERA, Folder, close, look};
-use noisefloor_scenefile::{LoadError, LoadOptions, Treatment, group_warnings, load_with};
+use crate::util::{CAMERA, Folder, close, seen};
+use noisefloor_scenefile::{LoadFault, LoadOptions, Treatment, group_warnings, load_with};
 
 fn scene(inside: &str) -> String {
     format!("<scene version='3.0.0'>{CAMERA}\n{inside}</scene>")
@@ -21,7 +21,7 @@ fn includes_are_read_in_place_with_their_own_lines() {
     let body = r#"<default name="level" value="0.5"/><include filename="lamp.xml"/>
         <include filename="alone.xml"/><shape type="cube"><ref id="grey"/>
         <transform name="to_world"><translate z="-50"/></transform></shape>"#;
-    close(look(folder.body(body).unwrap()), [0.5; 3], 1e-4, body);
+    close(seen(folder.body(body).unwrap()), [0.5; 3], 1e-4, body);
     let wrong = folder.body(r#"<include filename="wrong.xml"/>"#).unwrap_err();
     assert!(wrong.contains("wrong.xml: line 3: <shape type=\"hair\"> is not supported"), "{wrong}");
     let round = folder.body(r#"<include filename="round.xml"/>"#).unwrap_err();
@@ -45,13 +45,13 @@ fn parameters_come_from_options_then_from_the_first_default() {
     ));
     std::fs::write(&path, &text).unwrap();
     let mut options = LoadOptions::default();
-    close(look(load_with(&path, &options).unwrap()), [0.5; 3], 1e-4, "default");
+    close(seen(load_with(&path, &options).unwrap()), [0.5; 3], 1e-4, "default");
     options.parameters.insert("level".to_owned(), "0.25".to_owned());
-    close(look(load_with(&path, &options).unwrap()), [0.25; 3], 1e-4, "option");
+    close(seen(load_with(&path, &options).unwrap()), [0.25; 3], 1e-4, "option");
     // What is not read needs no value
     let unread = r#"<sensor type="perspective"><float name="fov" value="$fov"/></sensor>"#;
     let loaded = folder.body(&format!("{unread}{}", lamp("0.5"))).unwrap();
-    close(look(loaded), [0.5; 3], 1e-4, "unset");
+    close(seen(loaded), [0.5; 3], 1e-4, "unset");
     let unset = folder.body(&lamp("$level")).unwrap_err();
     assert!(unset.contains("line 2: `$level` has no value"), "{unset}");
 }
@@ -69,7 +69,7 @@ fn other_folders_are_searched_within_the_root() {
     std::fs::write(&path, scene(text)).unwrap();
     let mut options = LoadOptions::default();
     options.root = Some(folder.path().join("a"));
-    assert!(matches!(load_with(&path, &options), Err(LoadError::Outside { .. })));
+    assert!(matches!(load_with(&path, &options).unwrap_err().fault, LoadFault::Outside(_)));
     options.root = Some(folder.path().to_owned());
     assert_eq!(load_with(&path, &options).unwrap().scene.surfaces(), 1);
 }

@@ -1,6 +1,6 @@
 //! What surfaces look like: radiance in closed form.
 
-use crate::kit::{Maker, assert_warns, json, render};
+use super::kit::{Maker, assert_warns, json, render};
 use noisefloor::Rgb;
 
 const NEAREST: &str = r#"{"magFilter": 9728}"#;
@@ -9,9 +9,7 @@ const POLISHED: &str = r#""metallicFactor": 1, "roughnessFactor": 0"#;
 
 /// A rectangle that fills the image, at z = −1, in surroundings of radiance 1.
 pub(crate) fn wall(material: &str) -> Maker {
-    let mut maker = Maker::new();
-    let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, material);
-    maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
+    let mut maker = Maker::wall(material);
     maker.surroundings();
     maker
 }
@@ -213,8 +211,7 @@ fn emission_has_strength() {
 /// A wall that gives off 1 in front of one that gives off 3.
 fn veil(material: &str) -> Maker {
     let mut maker = wall(material);
-    let behind = maker.rectangle([-9.0, 9.0], [-9.0, 9.0], -2.0, r#"{"emissiveFactor": [3, 3, 3]}"#);
-    maker.node(&format!(r#"{{"mesh": {behind}}}"#));
+    maker.show([-9.0, 9.0], [-9.0, 9.0], -2.0, r#"{"emissiveFactor": [3, 3, 3]}"#);
     maker
 }
 
@@ -320,12 +317,12 @@ fn backs_are_culled_unless_double_sided() {
     }
     // A floor below a roof that faces up: seen from below it is not there, and the sun shines through
     let sun = r#"{"type": "directional", "intensity": 3.1415927}"#;
-    let mut maker = crate::lights::floor(sun, r#""rotation": [-0.70710678, 0, 0, 0.70710678]"#);
+    let mut maker = super::lights::floor(sun, r#""rotation": [-0.70710678, 0, 0, 0.70710678]"#);
     let mesh = maker.rectangle([-9.0, 9.0], [-9.0, 9.0], 0.0, "{}");
     let up = r#""rotation": [-0.70710678, 0, 0, 0.70710678], "translation": [0, 4, 0]"#;
     maker.node(&format!(r#"{{"mesh": {mesh}, {up}}}"#));
     let pixels = render(maker.load().unwrap(), 2, 16, 2);
-    assert_close(pixels[0], [crate::lights::ALBEDO; 3], 2e-3);
+    assert_close(pixels[0], [super::lights::ALBEDO; 3], 2e-3);
 }
 
 /// A wall of glass of index 2, with more extensions.
