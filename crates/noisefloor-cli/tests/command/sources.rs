@@ -57,6 +57,11 @@ fn what_tiles_wait_for_is_said() {
     assert_eq!(all as usize, waits.len() - count(""), "{reported}");
     assert!(said.contains(&format!("{unmet} of 16 tiles wait for light")), "{said}");
     assert!(said.contains("one dot at (80, 70) holds 100 % of it"), "{said}");
+    // Those around the dot show it as noise
+    let noisy = count("noise");
+    let dot =
+        format!("one dot at (80, 70) keeps {noisy} of 16 tiles open: it holds 100 % of the noise of its own");
+    assert!(noisy > 0 && said.contains(&dot), "{noisy}: {said}");
     let Picture::Display(map) = read_picture(out.join("stops.png")).unwrap() else { panic!("a PNG") };
     let framed = [255.0, 210.0, 40.0].map(|byte: f32| byte / 255.0);
     let is_framed = |x: usize, y: usize| map.pixels[y * map.width + x] == framed;

@@ -2,10 +2,18 @@
 
 use super::{CHECKPOINT, Output, open_for, typical_threshold, uniform_samples};
 use crate::job::CriterionJob;
-use noisefloor::{Audience, Session, criterion::OpenFor, display::luminance, driver::Clock};
+use noisefloor::{
+    Audience, Rgb, Session, Tile,
+    criterion::OpenFor,
+    display::{Display, luminance},
+    driver::Clock,
+};
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_cli::sources::Source;
 use noisefloor_ptwne::ReferenceNoise;
+
+/// Edge of the window in which people look for noise, in degrees.
+const WINDOW: f64 = 0.75;
 
 impl Output {
     /// Says what came of the render.
@@ -95,12 +103,28 @@ impl Output {
         Ok(())
     }
 
-    /// Says what keeps tiles open, where that is not their noise in more than a tenth of them.
+    /// Says which dot keeps tiles open by its noise, and what else keeps them open if it is more than a tenth of them.
     fn say_open_for(&self, session: &Session) -> Result<(), NotSaid> {
         let (counts, tiles) = (open_for(session), session.film().grid().len());
         let other =
             counts.iter().filter(|(why, _)| **why != OpenFor::Noise).map(|(_, count)| count).sum::<usize>();
-        if session.criterion().only_counts() || other * 10 <= tiles {
+        if session.criterion().only_counts() {
+            return Ok(());
+        }
+        let noisy: Vec<Tile> =
+            session.film().grid().tiles().filter(|tile| shows_noise(session, tile.index)).collect();
+        let display = session.display_so_far();
+        let dots = noisy.iter().filter_map(|&tile| Dot::of_noise(session, &display, tile));
+        if let Some(dot) = dots.max_by(|a, b| a.share.total_cmp(&b.share)) {
+            let count = noisy.iter().filter(|&&tile| dot.is_near(tile, session)).count();
+            say!(
+                "one dot at ({}, {}) keeps {count} of {tiles} tiles open: it holds {:.0} % of the noise of its own",
+                dot.x,
+                dot.y,
+                100.0 * dot.share
+            )?;
+        }
+        if other * 10 <= tiles {
             return Ok(());
         }
         for (&why, count) in &counts {
@@ -109,9 +133,12 @@ impl Output {
                     "{count} of {tiles} tiles wait for the exposure, which so few samples do not tell yet; --exposure sets one"
                 )?,
                 OpenFor::UnmetLight => {
-                    let dot = brightest_find(session).map(|(x, y, share)| {
-                        format!("; one dot at ({x}, {y}) holds {:.0} % of it", 100.0 * share)
-                    });
+                    let light = |[a, b]: [Rgb; 2]| (luminance(a) - luminance(b)).abs();
+                    let dot = brightest_find(session, session.film().grid().tiles(), light).map(
+                        |Dot { x, y, share }| {
+                            format!("; one dot at ({x}, {y}) holds {:.0} % of it", 100.0 * share)
+                        },
+                    );
                     say!(
                         "{count} of {tiles} tiles wait for light that few samples have met elsewhere, \
                          and that would be seen in them{}",
@@ -132,19 +159,55 @@ impl Output {
     }
 }
 
-/// The pixel that has most of the light which one half alone has met, and its share of all of that.
-fn brightest_find(session: &Session) -> Option<(usize, usize, f64)> {
+/// The pixel of `tiles` that has most of what the halves differ by, in some measure, and its share of all of that.
+fn brightest_find(
+    session: &Session,
+    tiles: impl IntoIterator<Item = Tile>,
+    differ: impl Fn([Rgb; 2]) -> f32,
+) -> Option<Dot> {
     let (film, width) = (session.film(), session.film().grid().width());
-    let found = |(tile, pixel): (usize, usize)| {
-        let [a, b] = film.pixel_halves(tile, pixel).map(|(mean, _)| f64::from(luminance(mean)));
-        ((a - b).abs(), pixel)
-    };
-    let pixels =
-        film.grid().tiles().flat_map(|tile| tile.rows(width).flatten().map(move |pixel| (tile.index, pixel)));
-    let (all, (most, pixel)) = pixels
-        .map(found)
-        .fold((0.0, (0.0, 0)), |(all, most), one| (all + one.0, if one.0 > most.0 { one } else { most }));
-    (most > 0.0).then(|| (pixel % width, pixel / width, most / all))
+    let (mut all, mut most, mut brightest) = (0.0, 0.0, 0);
+    for (tile, pixel) in
+        tiles.into_iter().flat_map(|tile| tile.rows(width).flatten().map(move |pixel| (tile.index, pixel)))
+    {
+        let found = f64::from(differ(film.pixel_halves(tile, pixel).map(|(mean, _)| mean)));
+        all += found;
+        if found > most {
+            (most, brightest) = (found, pixel);
+        }
+    }
+    (most > 0.0).then(|| Dot { x: brightest % width, y: brightest / width, share: most / all })
+}
+
+/// Whether a tile is open for noise as it was rendered.
+fn shows_noise(session: &Session, tile: usize) -> bool {
+    session.open_for(tile) == Some(OpenFor::Noise)
+        && session.verdict(tile).is_some_and(|it| it.lost.is_none())
+}
+
+/// A pixel that has more than its share.
+struct Dot {
+    x: usize,
+    y: usize,
+    share: f64,
+}
+
+impl Dot {
+    /// One that has most of the noise which a tile shows.
+    fn of_noise(session: &Session, display: &Display, tile: Tile) -> Option<Self> {
+        let shown = |halves: [Rgb; 2]| {
+            let [a, b] = halves.map(|mean| display.luma(mean));
+            (a - b).powi(2)
+        };
+        brightest_find(session, [tile], shown).filter(|dot| dot.share > 0.5)
+    }
+
+    /// Whether a window in which people look for noise may lie in both it and a tile.
+    fn is_near(&self, tile: Tile, session: &Session) -> bool {
+        let window = (WINDOW * session.params().viewing.pixels_per_degree()) as usize;
+        let near = |at: usize, from: usize, length: usize| at + window > from && at < from + length + window;
+        near(self.x, tile.x, tile.width) && near(self.y, tile.y, tile.height)
+    }
 }
 
 /// What a reference is like.
