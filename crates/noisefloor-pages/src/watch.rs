@@ -198,4 +198,42 @@ mod tests {
         let [one, other] = [live.png(), live.png()];
         assert_eq!((one.as_ptr(), one.len()), (other.as_ptr(), 1 << 20));
     }
+
+    /// In Chromium, where there is one: what tiles are open for, under the colours of their frames in maps.
+    #[test]
+    fn the_page_names_what_tiles_wait_for() {
+        let (live, mut state) = (Arc::new(LiveRender::default()), LiveState::new("hall", "ptwne"));
+        let named = ["noise", "exposure", "unmet-light", "few-samples", "doubt"];
+        let tile = |(i, why)| LiveTile {
+            x: 8 * i,
+            y: 0,
+            width: 8,
+            height: 8,
+            spp: 16,
+            probability: None,
+            open: true,
+            open_for: Some(why),
+        };
+        (state.width, state.height) = (40, 8);
+        state.tiles = named.into_iter().enumerate().map(tile).collect();
+        live.publish(&state, None);
+        let address = WatchServer::start(live, ([127, 0, 0, 1], 0).into(), &Exposure::default()).unwrap();
+        let mut browser = std::process::Command::new("chromium");
+        browser.args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--virtual-time-budget=3000",
+            "--dump-dom",
+        ]);
+        let Ok(shown) = browser.arg(format!("http://{address}")).output() else {
+            return eprintln!("not tested: there is no chromium");
+        };
+        let shown = String::from_utf8(shown.stdout).unwrap();
+        let colours = ["90, 170, 255", "255, 210, 40", "120, 230, 120", "255, 90, 90"];
+        for (why, colour) in named[1..].iter().zip(colours) {
+            let key = format!("solid rgba({colour}, 0.9);\">1 open for {why}</span>");
+            assert!(shown.contains(&key), "{key}: {shown}");
+        }
+    }
 }

@@ -45,6 +45,12 @@ fn colours_lie_over_their_tiles() {
     {
         assert_eq!(at(x, y), [255, 0, 0], "{x} {y}");
     }
+    // Which is named there
+    let (mut named, line) = (Canvas::new(64 + LEGEND, canvas.height(), PAPER), canvas.height() - 16 - LINE);
+    named.text("red", (64 + 27, line + 4), &FONT_7X13, INK, Alignment::Left);
+    for (x, y) in (line..line + 10).flat_map(|y| (64 + 27..64 + 48).map(move |x| (x, y))) {
+        assert_eq!(at(x, y), &named.bytes()[(y * named.width() + x) * 3..][..3], "{x} {y}");
+    }
     assert!([(40, 0), (40, 3), (61, 16), (8, 1)].iter().all(|&(x, y)| at(x, y) != [255, 0, 0]));
 }
 
