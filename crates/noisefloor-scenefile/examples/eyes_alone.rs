@@ -3,7 +3,7 @@
 //!
 //! `eyes_alone SCENE WIDTHxHEIGHT TILE SEED MOST [dot]`: SCENE is built-in or a file; `dot` gives one sample in the middle 10,000
 //! times the light of the picture. Prints the mean samples per pixel of both, tiles that have converged with both, the mean of
-//! both over tiles that have with both, and what tiles were last open for, as lines `NAME VALUE`.
+//! both over these, tiles that have converged with either, and what tiles were last open for, as lines `NAME VALUE`.
 #![allow(clippy::print_stdout, reason = "it is what this example is for")]
 
 use noisefloor::criterion::{CriterionError, Needs, OpenFor, View};
@@ -134,6 +134,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         both.len()
     );
     println!("oracle-both {:.1}\neyes-both {:.1}", mean(&all), mean(&both));
+    let done = |ends: &Ends| ends.iter().filter(|end| end.1).count();
+    println!("oracle-done {}\neyes-done {}", done(&oracle), done(&eyes));
     let mut counts: BTreeMap<OpenFor, usize> = BTreeMap::new();
     oracle.iter().for_each(|end| *counts.entry(end.2.unwrap_or(OpenFor::Noise)).or_default() += 1);
     counts.into_iter().for_each(|(why, count)| println!("{} {count}", why.name()));
