@@ -41,7 +41,7 @@ use noisefloor_vision::{VisionComparison, VisionError, VisionModel, VisionWorksp
 use rayon::prelude::*;
 
 /// Of 20 tiles that stop by an estimate, 19 have lost less than so many times as much as it says: chosen in the tiles of two
-/// scenes, and tried in those of fourteen others (`docs/denoising.md`). An estimate errs both ways, and a tile stops where it
+/// scenes, and tried in those of fourteen others. An estimate errs both ways, and a tile stops where it
 /// errs to the low side.
 pub const ESTIMATE_ERRS_BY: f64 = 1.5;
 /// What two residuals have in common is averaged over this many pixels to each side: 4,225 pixels in all, so

@@ -8,7 +8,7 @@ use noisefloor::{ProgressiveSource, Rgb, SourceError, Tile, source::FirstHits};
 use thiserror::Error;
 
 /// Root mean square of the noise of albedo and normals, in the noisiest square of [`SQUARE`] pixels, up to which they
-/// are clean (`docs/denoising.md`).
+/// are clean.
 const CLEAN: f64 = 0.02;
 const SQUARE: usize = 64;
 /// Rays a pixel of the first pictures of a source, and how many times more the next ones have.

@@ -33,7 +33,7 @@ impl DenoisePasses {
         }
     }
 
-    /// What is wrong with the mean, as a share of what is wrong with one pass (`docs/denoising.md`).
+    /// What is wrong with the mean, as a share of what is wrong with one pass.
     pub(crate) fn gain(self) -> f32 {
         match self {
             Self::One => 1.0,

@@ -58,7 +58,7 @@ pub struct ResidualPatch<'a> {
     pub rows: Range<usize>,
 }
 
-/// How much of the model is computed for a residual: less is faster. `docs/benchmarks/cost.md` has a table.
+/// How much of the model is computed for a residual: less is faster.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisionDetail {
     /// Bands of which the chromatic channels are computed, too: those whose centre lies at this or below, in cycles per
@@ -340,7 +340,7 @@ pub fn rescaled(difference: f32, contrast: f32) -> f32 {
 /// What differences of each channel count for in [`VisibleDifference::contrast_energy`]. It sums over bands, of which the metric
 /// takes the mean of fourth order, and achromatic noise of single pixels is seen in two bands, chromatic in five: of
 /// [`VisionDetail::COLOUR`], four. With these weights, chosen on flat pictures, noise of any colour has lost as many JODs
-/// as grey noise of the same energy, most often within 0.05 (`docs/benchmarks/stops.md`).
+/// as grey noise of the same energy, most often within 0.05.
 const BESIDE_ACHROMATIC: [f32; CHANNELS] = [1.0, 0.7, 0.7];
 
 /// What the two pictures have of the residual beside the middle between them.

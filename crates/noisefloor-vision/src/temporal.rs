@@ -6,8 +6,7 @@
 //! frame looks the same in space after such a filter, and has √(Σ hₖ²) of its standard deviation. What is the same
 //! in every frame passes the sustained channels as it is (Σ hₖ = 1), and not the transient one (Σ hₖ = 3·10⁻⁷).
 //! So one frame, with its noise times a gain for each channel, stands for the film. The mean of a heavy tail over
-//! frames is nearer to a normal distribution than its values are, which this leaves out:
-//! `docs/benchmarks/films.md` has what it amounts to.
+//! frames is nearer to a normal distribution than its values are, which this leaves out.
 
 use crate::photometry::CHANNELS;
 

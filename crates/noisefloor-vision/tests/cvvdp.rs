@@ -146,8 +146,7 @@ fn jod_and_map_are_those_of_cvvdp() {
 }
 
 /// One frame stands for a film: to the digits of single precision for what the package makes of the same frame with
-/// the same gains, and within 0.05 JOD for what it makes of the film, unless that loses more than 2. The noise here has no tails;
-/// `docs/benchmarks/films.md` has that of renderers.
+/// the same gains, and within 0.05 JOD for what it makes of the film, unless that loses more than 2. The noise here has no tails.
 #[test]
 fn a_frame_of_a_film_is_judged_as_the_film() {
     let mut workspace = VisionWorkspace::default();

@@ -342,7 +342,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// # Errors
     /// [`SessionError::Background`] if the criterion panicked.
     pub fn into_session(self) -> Result<Session<C>, SessionError> {
-        self.take()
+        self.take_session()
     }
 
     /// As [`Background::into_session`], once: for handles of other languages, which others may hold. From then on, nothing more
@@ -352,21 +352,6 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// As of [`Background::into_session`], and the second time.
     #[doc(hidden)]
     pub fn take_session(&self) -> Result<Session<C>, SessionError> {
-        self.take()
-    }
-
-    /// Drops passes that wait, and ends the thread once the verdict that is being given is; nothing more is taken. For
-    /// languages whose interpreter ends before this is dropped.
-    #[doc(hidden)]
-    pub fn stop(&self) {
-        let mut state = self.shared.state();
-        state.waiting.clear();
-        state.closed = true;
-        drop(state);
-        self.end();
-    }
-
-    fn take(&self) -> Result<Session<C>, SessionError> {
         // A renderer on another thread may hand over pass after pass: no more of them, or this would wait for ever
         self.shared.state().closed = true;
         self.shared.changed.notify_all();
@@ -384,6 +369,17 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
             session.add_late_running(total, &image)?;
         }
         Ok(session)
+    }
+
+    /// Drops passes that wait, and ends the thread once the verdict that is being given is; nothing more is taken. For
+    /// languages whose interpreter ends before this is dropped.
+    #[doc(hidden)]
+    pub fn stop(&self) {
+        let mut state = self.shared.state();
+        state.waiting.clear();
+        state.closed = true;
+        drop(state);
+        self.end();
     }
 }
 

@@ -51,12 +51,6 @@ impl<'a> View<'a> {
     pub fn beside(self, reference: &'a [Rgb]) -> Self {
         Self { reference: Some(reference), ..self }
     }
-
-    /// The same with [`View::exposure_error`].
-    #[must_use]
-    pub fn exposed_within(self, exposure_error: f64) -> Self {
-        Self { exposure_error, ..self }
-    }
 }
 
 /// What a criterion reads besides the mean picture; nothing else is kept or rendered.

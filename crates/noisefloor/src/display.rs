@@ -19,9 +19,6 @@ pub use srgb::{srgb_decode, srgb_encode};
 pub use tone_curve::ToneCurve;
 pub use tone_table::ToneTableError;
 
-/// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
-pub(crate) const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;
-
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
 pub const DEFAULT_KEY: f32 = 0.18;
 

@@ -246,11 +246,6 @@ impl<S: ProgressiveSource, C: StoppingCriterion> Driver<S, C> {
         &mut self.source
     }
 
-    /// Takes the driver apart: the source as the run left it, and the session.
-    pub fn into_parts(self) -> (S, Session<C>) {
-        (self.source, self.session)
-    }
-
     /// One point a batch.
     pub fn timeline(&self) -> &[TimelinePoint] {
         &self.timeline

@@ -389,18 +389,6 @@ impl Film {
         }
     }
 
-    /// Adds the new samples in a running mean of `total` samples per pixel, for renderers that keep one of
-    /// their own. The difference is computed in f64 and amplifies the rounding of the running mean by
-    /// total/(new samples): push batches where you can.
-    ///
-    /// # Errors
-    /// [`FilmError`] as [`Film::add`], and if `total` is not above the samples that the film has.
-    pub fn add_running(&mut self, tile: usize, total: u64, mean: &[Rgb]) -> Result<(), FilmError> {
-        let place = self.check(tile, mean.len())?;
-        let (new, batch) = self.new_of_running(place, total, TilePixels::alone(place, mean))?;
-        self.add(tile, new, &batch)
-    }
-
     /// The number of new samples in a running mean of a tile, and their mean.
     pub(crate) fn new_of_running(
         &self,

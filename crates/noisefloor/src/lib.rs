@@ -79,6 +79,9 @@ pub mod tune;
 pub mod unmet;
 pub mod watch;
 
+#[cfg(test)]
+mod tests;
+
 /// Displays, and how far people sit from them.
 pub mod viewing {
     pub use noisefloor_vision::{

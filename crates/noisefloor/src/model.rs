@@ -92,11 +92,6 @@ pub enum ModelError {
 pub struct Model(ModelParts);
 
 impl Model {
-    fn of(parts: ModelParts) -> Result<Self, ModelError> {
-        parts.check().map_err(|what| ModelError::Invalid(what.into()))?;
-        Ok(Self(parts))
-    }
-
     pub(crate) fn parts(&self) -> &ModelParts {
         &self.0
     }
@@ -144,7 +139,8 @@ impl Model {
     /// # Errors
     /// [`ModelError::Invalid`] if they contradict each other, or a number is not finite.
     pub fn new(parts: ModelParts) -> Result<Self, ModelError> {
-        Self::of(parts)
+        parts.check().map_err(|what| ModelError::Invalid(what.into()))?;
+        Ok(Self(parts))
     }
 
     /// The parts, to make another model of them.

@@ -1,8 +1,9 @@
 //! Whether one picture contains the samples of another.
 
 use crate::descriptor::NoiseMask;
-use crate::display::{Display, ROUNDING_LUMINANCE, luminance};
+use crate::display::Display;
 use crate::evidence::{Plane, Rendering, Samples};
+use crate::rgb::{ROUNDING_LUMINANCE, luminance};
 use crate::tile::Tile;
 
 /// Edge of the blocks that count as independent observations, in pixels: wider than any pixel filter.

@@ -96,15 +96,6 @@ impl Oracle {
         self.people
     }
 
-    pub(crate) fn describe_tile(&self, planes: &TilePlanes, spp: f64) -> Result<Described, CriterionError> {
-        let (trained, asked) = (self.model.viewing(), planes.viewing);
-        if asked != trained && !self.model.parts().descriptor.knows_viewing() {
-            let (trained, asked) = (trained.to_string(), asked.to_string());
-            return Err(CriterionError::Viewing { name: self.name(), trained, asked });
-        }
-        self.model.parts().descriptor.describe_tile(planes, spp).map_err(|e| self.misfit(e))
-    }
-
     fn verdict_for(&self, mut raw: Vec<f32>, spp: f64, audience: Audience) -> Option<Verdict> {
         let seen_as = audience.seen_as(spp);
         // For someone who is never satisfied with so few samples, the need of the trained audience is sought
@@ -169,29 +160,6 @@ impl Oracle {
     /// [`tune`](crate::tune) can say how visible noise is.
     pub fn maps_visible_noise(&self) -> bool {
         self.model.parts().descriptor.visible_noise(&[]).is_some()
-    }
-
-    pub(crate) fn map_noise(
-        &self,
-        grid: TileGrid,
-        tiles: &[Described],
-        audience: Audience,
-    ) -> Option<Vec<f32>> {
-        let maps = self.model.parts().descriptor.visible_noise(tiles)?;
-        let numbers = self.model.parts().descriptor.in_picture(tiles);
-        let mut image = vec![f32::NAN; grid.width() * grid.height()];
-        for ((tile, map), raw) in tiles.iter().zip(&maps).zip(&numbers) {
-            let mut curve = self.model.parts().curve(raw, self.scatter);
-            // Noise as strong as in the worst window needs this many times the samples
-            let needed = self.crossing(|factor| curve.at(factor)).map_or(f32::INFINITY, |trained| {
-                let wanted = audience.needed(f64::from(trained) * tile.spp) / tile.spp;
-                wanted as f32
-            });
-            let worst = map.values().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-            let pixels = tile.place.rows(grid.width()).flatten();
-            pixels.zip(map.values()).for_each(|(pixel, &value)| image[pixel] = value / worst * needed.sqrt());
-        }
-        Some(image)
     }
 
     /// How many times the samples P reaches what is asked for, within 2±²⁰, to a hundredth of a doubling; `None` if
@@ -263,7 +231,7 @@ impl Oracle {
         tile: Tile,
     ) -> Result<Option<LastDescribed>, CriterionError> {
         let Some(planes) = self.planes(view, shown, tile)? else { return Ok(None) };
-        let described = self.describe_tile(&planes, view.film.spp(tile.index) as f64);
+        let described = self.describe(&planes, view.film.spp(tile.index) as f64);
         let carriers = planes.noise_carriers();
         planes.recycle();
         let met_once = MetOnce::of(view.film, view.display, tile);
@@ -281,7 +249,7 @@ impl Oracle {
         let Judged { verdicts, described } = self.judge_seen(view, &seen, &tiles)?;
         let audience = self.audience().then(view.audience);
         let described: Vec<Described> = described.into_iter().flatten().collect();
-        let map = self.map_noise(view.film.grid(), &described, audience);
+        let map = self.map_visible_noise(view.film.grid(), &described, audience);
         Ok((verdicts.into_iter().map(|(verdict, _)| verdict).collect(), map))
     }
 
@@ -375,7 +343,7 @@ impl Oracle {
             }
         }
         light.recycle();
-        let described = self.describe_tile(&planes, spp);
+        let described = self.describe(&planes, spp);
         planes.recycle();
         described
     }
@@ -388,14 +356,14 @@ impl Oracle {
         audience: Audience,
         light: impl Fn(Tile) -> Result<Option<([TilePlanes; 2], OpenFor)>, E> + Sync,
     ) -> Result<Option<Judged>, E> {
-        let Some(by_noise) = self.judge_finished_noise(&described, audience) else { return Ok(None) };
+        let Some(by_noise) = self.judge_described_for(&described, audience) else { return Ok(None) };
         let enough = |verdict: Verdict| (verdict, verdict.converged);
         let tiles: Vec<Tile> = described.iter().map(|d| d.place).collect();
         let spp = described.first().map_or(1.0, |d| d.spp);
         let mut described: Vec<Option<Described>> = described.into_iter().map(Some).collect();
         let judge = |described: &[Option<Described>]| {
             let described: Vec<Described> = described.iter().flatten().cloned().collect();
-            self.judge_finished_noise(&described, audience).into_iter().flatten().map(enough).collect()
+            self.judge_described_for(&described, audience).into_iter().flatten().map(enough).collect()
         };
         let lit = |tile: Tile| -> Result<Option<(Described, OpenFor)>, E> {
             match light(tile)? {
@@ -406,17 +374,6 @@ impl Oracle {
         let by_noise = by_noise.into_iter().map(enough).collect();
         let verdicts = judge_with_light(by_noise, &mut described, &tiles, judge, lit)?;
         Ok(Some(Judged { verdicts, described }))
-    }
-
-    /// Judges the tiles of a picture by their noise, for an audience; `None` if the descriptor does not tell noise from picture,
-    /// and the audience is not [`Audience::TRAINED`].
-    fn judge_finished_noise(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
-        let numbers = self.model.parts().descriptor.in_picture(tiles);
-        let judge = |(tile, raw): (&Described, Vec<f32>)| match audience {
-            Audience::TRAINED => Some(self.verdict(&raw, tile.spp.round() as u64, Unknown::default())),
-            _ => self.verdict_for(raw, tile.spp, audience),
-        };
-        tiles.iter().zip(numbers).map(judge).collect()
     }
 
     /// What stands before and after the share of people in the fingerprint.
@@ -445,13 +402,18 @@ impl Oracle {
     /// [`CriterionError::TileSize`] if the model is for tiles of another size, [`CriterionError::Viewing`] if
     /// it is for other viewing conditions.
     pub fn describe(&self, planes: &TilePlanes, spp: f64) -> Result<Described, CriterionError> {
-        self.describe_tile(planes, spp)
+        let (trained, asked) = (self.model.viewing(), planes.viewing);
+        if asked != trained && !self.model.parts().descriptor.knows_viewing() {
+            let (trained, asked) = (trained.to_string(), asked.to_string());
+            return Err(CriterionError::Viewing { name: self.name(), trained, asked });
+        }
+        self.model.parts().descriptor.describe_tile(planes, spp).map_err(|e| self.misfit(e))
     }
 
     /// Judges the tiles that make up a picture, or as many as there are of it: people see a tile in its
     /// picture, and so does the model. One verdict a tile.
     pub fn judge_described(&self, tiles: &[Described]) -> Vec<Verdict> {
-        self.judge_finished_noise(tiles, Audience::TRAINED).unwrap_or_default()
+        self.judge_described_for(tiles, Audience::TRAINED).unwrap_or_default()
     }
 
     /// Judges tiles as [`Oracle::judge_described`] does, for other eyes than those of the training data: P is
@@ -459,7 +421,12 @@ impl Oracle {
     /// `None` if that cannot be told, since the descriptor does not tell noise from picture, and the audience
     /// is not [`Audience::TRAINED`].
     pub fn judge_described_for(&self, tiles: &[Described], audience: Audience) -> Option<Vec<Verdict>> {
-        self.judge_finished_noise(tiles, audience)
+        let numbers = self.model.parts().descriptor.in_picture(tiles);
+        let judge = |(tile, raw): (&Described, Vec<f32>)| match audience {
+            Audience::TRAINED => Some(self.verdict(&raw, tile.spp.round() as u64, Unknown::default())),
+            _ => self.verdict_for(raw, tile.spp, audience),
+        };
+        tiles.iter().zip(numbers).map(judge).collect()
     }
 
     /// The visible noise of a whole image, row-major, from its tiles as described; NaN where there is none of them.
@@ -472,7 +439,21 @@ impl Oracle {
         tiles: &[Described],
         audience: Audience,
     ) -> Option<Vec<f32>> {
-        self.map_noise(grid, tiles, audience)
+        let maps = self.model.parts().descriptor.visible_noise(tiles)?;
+        let numbers = self.model.parts().descriptor.in_picture(tiles);
+        let mut image = vec![f32::NAN; grid.width() * grid.height()];
+        for ((tile, map), raw) in tiles.iter().zip(&maps).zip(&numbers) {
+            let mut curve = self.model.parts().curve(raw, self.scatter);
+            // Noise as strong as in the worst window needs this many times the samples
+            let needed = self.crossing(|factor| curve.at(factor)).map_or(f32::INFINITY, |trained| {
+                let wanted = audience.needed(f64::from(trained) * tile.spp) / tile.spp;
+                wanted as f32
+            });
+            let worst = map.values().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+            let pixels = tile.place.rows(grid.width()).flatten();
+            pixels.zip(map.values()).for_each(|(pixel, &value)| image[pixel] = value / worst * needed.sqrt());
+        }
+        Some(image)
     }
 }
 

@@ -138,7 +138,7 @@ impl Spread {
     /// stop, 8.2 % at 30 % of it) 0.36 for whole pictures and 0.40 to 0.55 for one zone; 0.79 for the 16 people of
     /// ModelFest, 0.63 to 0.75 in three sets of contrast sensitivities with their noise of measurement, 0.44 in
     /// MCL-JCI, 0.53 to 0.67 for increments of noise, at most 0.45 between the zones of SIN3D. At 0.4 and 0.7, 95 %
-    /// need ×0.93 and ×1.16 of what they need at 0.5, for the same mean (`docs/accuracy.md`).
+    /// need ×0.93 and ×1.16 of what they need at 0.5, for the same mean.
     pub const PEOPLE: f64 = 0.5;
     /// Of that, the part that differs from place to place in one picture: whole pictures scatter by 0.36, single
     /// places by 0.5 (above), and the squares of independent parts add up.

@@ -9,3 +9,6 @@ pub type Rgb = [f32; 3];
 pub fn luminance([r, g, b]: Rgb) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
+
+/// Luminance weights, squared and summed: variance of Y′ for unit variance of R′, G′ and B′.
+pub const ROUNDING_LUMINANCE: f32 = 0.2126 * 0.2126 + 0.7152 * 0.7152 + 0.0722 * 0.0722;

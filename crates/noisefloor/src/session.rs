@@ -292,13 +292,16 @@ impl<C: StoppingCriterion> Session<C> {
     /// [`SessionError::Image`] if its size is not the image's, and as of [`Session::push`]: tiles before the
     /// one that is refused have the samples then.
     pub fn push_image(&mut self, spp: u64, image: &[Rgb]) -> Result<(), SessionError> {
+        let (open, width) = (self.open_in(image)?, self.film.width());
+        self.push_tiles(spp, &open, |tile| TilePixels::in_image(tile, image, width))
+    }
+
+    /// The open tiles of a whole image, which has to have its size.
+    fn open_in(&self, image: &[Rgb]) -> Result<Vec<Tile>, SessionError> {
         let grid = self.film.grid();
-        let expected = grid.width() * grid.height();
-        if image.len() != expected {
-            return Err(SessionError::Image { got: image.len(), expected });
-        }
-        let open: Vec<Tile> = grid.tiles().filter(|tile| self.is_open(tile.index)).collect();
-        self.push_tiles(spp, &open, |tile| TilePixels::in_image(tile, image, grid.width()))
+        let (got, expected) = (image.len(), grid.width() * grid.height());
+        let open = || grid.tiles().filter(|tile| self.is_open(tile.index)).collect();
+        if got == expected { Ok(open()) } else { Err(SessionError::Image { got, expected }) }
     }
 
     /// Adds new samples of tiles, in the order of the grid: those before the one that is refused. All that tiles
@@ -382,7 +385,8 @@ impl<C: StoppingCriterion> Session<C> {
         Ok(())
     }
 
-    /// Adds the new samples in a running mean of a tile; see [`Film::add_running`].
+    /// Adds the new samples in a running mean of a tile, of `total` samples per pixel, for renderers that keep one of their own.
+    /// Their difference amplifies the rounding of the mean by total/(new samples): push batches where you can.
     ///
     /// # Errors
     /// As of [`Session::push`].
@@ -400,13 +404,7 @@ impl<C: StoppingCriterion> Session<C> {
     /// # Errors
     /// As of [`Session::push_image`] and [`Session::push_running`]: tiles before the one that is refused have the samples then.
     pub fn push_running_image(&mut self, total: u64, image: &[Rgb]) -> Result<(), SessionError> {
-        let grid = self.film.grid();
-        let expected = grid.width() * grid.height();
-        if image.len() != expected {
-            return Err(SessionError::Image { got: image.len(), expected });
-        }
-        let open: Vec<Tile> = grid.tiles().filter(|tile| self.is_open(tile.index)).collect();
-        self.push_running_tiles(total, &open, image)
+        self.push_running_tiles(total, &self.open_in(image)?, image)
     }
 
     /// As [`Session::push_running_image`], to these tiles, in the order of the grid.

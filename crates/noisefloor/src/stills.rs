@@ -406,13 +406,13 @@ impl<'a> SnapshotPair<'a> {
         grid: TileGrid,
         audience: Audience,
     ) -> Result<JudgedTiles, StillError> {
-        let described = self.describe_tiles(oracle, grid)?;
+        let described = self.describe(oracle, grid)?;
         let film = self.film(grid);
         let unmet = film.as_ref().map(|film| (film, Unmet::of(film, &self.display, self.viewing)));
         let light = |tile: Tile| -> Result<Option<([TilePlanes; 2], OpenFor)>, StillError> {
             let Some((film, unmet)) = &unmet else { return Ok(None) };
             let Some(shown) = unmet.shown(film, &self.display, tile) else { return Ok(None) };
-            Ok(Some(([self.planes_of(tile)?, shown], unmet.kind(film, tile))))
+            Ok(Some(([self.planes(tile)?, shown], unmet.kind(film, tile))))
         };
         let judged = oracle.judge_finished(described, audience, light)?;
         let Judged { verdicts, described } = judged.ok_or(StillError::Audience)?;
@@ -440,10 +440,6 @@ impl<'a> SnapshotPair<'a> {
     /// lie in them.
     #[doc(hidden)]
     pub fn planes(&self, tile: Tile) -> Result<TilePlanes, StillError> {
-        self.planes_of(tile)
-    }
-
-    fn planes_of(&self, tile: Tile) -> Result<TilePlanes, StillError> {
         Ok(TilePlanes { viewing: self.viewing, ..self.gather(tile)? })
     }
 
@@ -483,17 +479,8 @@ impl<'a> SnapshotPair<'a> {
     /// [`StillError`] if there is nothing to judge by, or the model is for tiles of another size.
     #[doc(hidden)]
     pub fn describe(&self, oracle: &Oracle, grid: TileGrid) -> Result<Vec<Described>, StillError> {
-        self.describe_tiles(oracle, grid)
-    }
-
-    pub(crate) fn describe_tiles(
-        &self,
-        oracle: &Oracle,
-        grid: TileGrid,
-    ) -> Result<Vec<Described>, StillError> {
         let tiles: Vec<Tile> = grid.tiles().collect();
-        let describe =
-            |&tile: &Tile| Ok(oracle.describe_tile(&self.planes_of(tile)?, self.image.spp.max(1.0))?);
+        let describe = |&tile: &Tile| Ok(oracle.describe(&self.planes(tile)?, self.image.spp.max(1.0))?);
         tiles.par_iter().map(describe).collect()
     }
 }
@@ -516,7 +503,7 @@ impl JudgedTiles {
     /// How visible the noise is at each pixel of the picture, row-major, as a multiple of what the audience just does not see.
     /// `None` if the model of this oracle, which has judged, does not tell noise from picture.
     pub fn visible_noise(&self, oracle: &Oracle) -> Option<Vec<f32>> {
-        oracle.map_noise(self.grid, &self.described, self.audience)
+        oracle.map_visible_noise(self.grid, &self.described, self.audience)
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// What a file holds instead of itself, if that is known, and what to do.
 pub fn stand_in(bytes: &[u8]) -> Option<&'static str> {
-    // The first line of a pointer (git-lfs, docs/spec.md); of a locked file of git-annex, its key
+    // The first line of a pointer (git-lfs); of a locked file of git-annex, its key
     if bytes.starts_with(b"version https://git-lfs.github.com/spec/") {
         return Some("this is a Git LFS pointer, not the file itself: run `git lfs pull`");
     }

@@ -322,7 +322,7 @@ impl Watch {
         let found = found.chain(mixed_up.map(Warning::MixedUp)).chain(negative.map(Warning::Negative));
         let behind = if self.running { self.sums[0].behind() } else { None };
         let found = found.chain(behind.map(Warning::Behind));
-        let clipped = self.sums[0].clipped(&values).filter(|_| !self.linear);
+        let clipped = self.sums[0].ends.clipped(&values).filter(|_| !self.linear).map(Warning::Clipped);
         let constant = self.tiles.iter().all(|tile| tile.repeats.first_again).then(|| film.pixel(0, 0));
         let constant = constant.filter(|&colour| film.is_all(colour)).map(Warning::Constant);
         let unsaid = self.is_unsaid().then_some(Warning::Unsaid).filter(|_| clipped.is_none());

@@ -19,7 +19,7 @@ const PICTURE_QUANTILES: [f64; 3] = [0.875, 0.75, 0.5];
 /// No choice: of people's zones hardly any has noise in so few pixels.
 const CREST: f64 = 1.35;
 /// No choice: it was taken for what the worst places of a picture lose by the vision model, which people's thresholds
-/// do not ask for. Offered beside 1.5, it would be turned down without eight of ten groups (docs/accuracy.md), and the
+/// do not ask for. Offered beside 1.5, it would be turned down without eight of ten groups, and the
 /// error would be that of another model.
 const BESIDE_PICTURE: f64 = 0.8;
 

@@ -9,7 +9,7 @@ use thiserror::Error;
 pub(crate) const WIDE: f64 = 1e-4;
 
 /// Numbers of the visible descriptor that decide. Texture and the light of the tile do not help on scenes that were left
-/// out (docs/accuracy.md).
+/// out.
 const WEIGHED: [&str; 3] = ["visible_noise", "picture_noise", "picture_light"];
 
 /// What kind of machine is trained.

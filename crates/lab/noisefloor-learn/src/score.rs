@@ -1,6 +1,6 @@
 //! Predicted thresholds against human ones.
 //!
-//! Scores are those of the rules of evidence in `docs/reference.md`: whole scenes left out, predictions clipped
+//! Scores follow the rules of evidence: whole scenes left out, predictions clipped
 //! to the levels that observers could choose, real pictures scored apart from synthesised levels.
 
 use crate::predict::Prediction;

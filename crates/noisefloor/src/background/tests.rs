@@ -1,7 +1,8 @@
 use super::*;
 use crate::checkpoint::Checkpoint;
-use crate::criterion::{CriterionError, FixedSpp, Verdict, View};
+use crate::criterion::{CriterionError, FixedSpp, Needs, Verdict, View};
 use crate::params::{Params, Schedule};
+use crate::tests::judging;
 use crate::watch::Fault;
 use noisefloor_testkit::Noise;
 use proptest::prelude::*;
@@ -232,29 +233,16 @@ impl StoppingCriterion for Reopens {
 }
 
 /// Converged after so many samples; `call` is called at each verdict.
-struct Calls<F> {
-    enough: u64,
-    call: F,
+fn calls(enough: u64, mut call: impl FnMut() + Send + 'static) -> impl StoppingCriterion + Send + 'static {
+    judging(Needs::default(), move |view, tiles| {
+        call();
+        Ok(tiles.iter().map(|tile| Verdict::new(view.film.spp(tile.index) >= enough)).collect())
+    })
 }
 
-impl<F: FnMut()> StoppingCriterion for Calls<F> {
-    fn name(&self) -> String {
-        "calls".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        (self.call)();
-        Ok(tiles.iter().map(|tile| Verdict::new(view.film.spp(tile.index) >= self.enough)).collect())
-    }
-}
-
-fn of_calls<F: FnMut() + Send>(call: F) -> Session<Calls<F>> {
-    let judge = Calls { enough: 100, call };
-    Session::new(32, 16, judge, Params::default().with_tile(16).with_max_spp(1 << 20)).unwrap()
+fn of_calls(call: impl FnMut() + Send + 'static) -> Session<impl StoppingCriterion + Send + 'static> {
+    let params = Params::default().with_tile(16).with_max_spp(1 << 20);
+    Session::new(32, 16, calls(100, call), params).unwrap()
 }
 
 fn grey<C: StoppingCriterion + Send + 'static>(background: &Background<C>) -> Result<(), SessionError> {
@@ -366,7 +354,7 @@ fn what_does_not_fit_is_refused_at_once() {
 }
 
 /// A criterion that waits until it may go on.
-fn gate() -> (Arc<AtomicBool>, Session<Calls<impl FnMut() + Send>>) {
+fn gate() -> (Arc<AtomicBool>, Session<impl StoppingCriterion + Send + 'static>) {
     let open = Arc::new(AtomicBool::new(false));
     let of_criterion = Arc::clone(&open);
     let wait = move || {
@@ -478,77 +466,6 @@ fn work_goes_to_the_pool_of_the_embedder() {
     assert!(matches!(background.finish(), Err(SessionError::Background(_))));
 }
 
-/// A clock that a renderer turns, so that a verdict takes as many calls of the renderer as it is said to, or until that waits.
-#[derive(Default)]
-struct Clock {
-    calls: Mutex<(u64, bool)>,
-    changed: Condvar,
-}
-
-impl Clock {
-    fn set(&self, change: impl FnOnce(&mut (u64, bool))) {
-        change(&mut self.calls.lock().unwrap());
-        self.changed.notify_all();
-    }
-
-    fn wait(&self, calls: u64) {
-        let now = self.calls.lock().unwrap();
-        let until = now.0 + calls;
-        drop(self.changed.wait_while(now, |(calls, waits)| *calls < until && !*waits).unwrap());
-    }
-}
-
-/// Never converged: all tiles stop at 400 samples. A verdict takes 30 calls of the renderer, each of 4 samples.
-fn never(clock: &Arc<Clock>) -> Session<Calls<impl FnMut() + Send + use<>>> {
-    let clock = Arc::clone(clock);
-    let params =
-        Params::default().with_tile(16).with_schedule(Schedule::Growing { step: 16 }).with_max_spp(400);
-    let judge = Calls { enough: u64::MAX, call: move || clock.wait(30) };
-    Session::new(32, 16, judge, params).unwrap()
-}
-
-/// A renderer of whole frames that is as fast as verdicts are slow: the passes that it hands over, and what it renders in vain.
-fn rendered(asks: bool) -> (Vec<u64>, u64) {
-    let clock = Arc::new(Clock::default());
-    let background = Background::new(never(&clock), 1, WhenFull::Wait).unwrap();
-    let (mut spp, mut passes) = (0, Vec::new());
-    while let Some(wanted) = background.next_pass() {
-        if spp >= wanted && background.pending() == 0 {
-            passes.push(spp);
-            background.push_image(std::mem::take(&mut spp), vec![[0.5; 3]; 32 * 16]).unwrap();
-            background.judge().unwrap();
-        }
-        if !asks || spp < background.spp_left() {
-            spp += 4;
-            clock.set(|(calls, _)| *calls += 1);
-        } else {
-            clock.set(|(_, waits)| *waits = true);
-            background.finish().unwrap();
-            clock.set(|(_, waits)| *waits = false);
-        }
-    }
-    let stops = background.finish().unwrap().stops;
-    let plain = Arc::new(Clock::default());
-    plain.set(|(_, waits)| *waits = true);
-    let mut plain = never(&plain);
-    let as_waiting = passes.iter().flat_map(|&spp| {
-        plain.push_image(spp, &[[0.5; 3]; 512]).unwrap();
-        plain.judge().unwrap()
-    });
-    let as_waiting: Vec<Stop> = as_waiting.collect();
-    assert!(as_waiting.len() == 2 && (stops.is_empty() || stops == as_waiting));
-    (passes, spp)
-}
-
-/// Whoever asks renders just what the limit allows; whoever does not renders on for as long as the last verdict takes.
-#[test]
-fn a_renderer_that_asks_renders_nothing_beyond_the_limit() {
-    let (passes, in_vain) = rendered(true);
-    assert_eq!((passes.iter().sum::<u64>(), in_vain), (400, 0), "{passes:?}");
-    let (passes, in_vain) = rendered(false);
-    assert!(passes.iter().sum::<u64>() + in_vain >= 400 + 4 * 29, "{passes:?} {in_vain}");
-}
-
 #[test]
 fn what_is_left_counts_all_that_was_handed_over() {
     let (open, session) = gate();
@@ -605,7 +522,7 @@ fn a_session_is_given_back_while_another_thread_hands_over() {
         }
     };
     let params = Params::default().with_tile(16).with_schedule(Schedule::Every { step: 16 });
-    let judge = Calls { enough: u64::MAX, call: until_one_waits };
+    let judge = calls(u64::MAX, until_one_waits);
     let session = Session::new(32, 16, judge, params.with_max_spp(1 << 40)).unwrap();
     let background = Background::new(session, 1, WhenFull::Wait).unwrap();
     let mut noise = Noise::new(63);

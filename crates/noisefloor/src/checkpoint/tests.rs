@@ -1,9 +1,9 @@
 use super::*;
-use crate::criterion::{CriterionError, FixedSpp, StoppingCriterion, Verdict, View};
+use crate::criterion::{FixedSpp, Needs, StoppingCriterion, Verdict};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
-use crate::tile::Tile;
+use crate::tests::judging_each;
 use proptest::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -63,25 +63,6 @@ fn kept<C: StoppingCriterion>(driver: &Driver<Noise, C>) -> Vec<u8> {
     let mut bytes = Vec::new();
     driver.session().checkpoint("noise").unwrap().write(&mut bytes).unwrap();
     bytes
-}
-
-#[cfg(feature = "bundled-model")]
-#[test]
-fn a_run_that_was_broken_off_goes_on_to_the_bit() {
-    let whole = broken_off(Oracle::bundled(), usize::MAX);
-    let reasons: Vec<_> = whole.session().stops().map(|s| s.spp).collect();
-    assert!(reasons.iter().any(|&n| n != reasons[0]), "tiles stop at different times: {reasons:?}");
-    let n = whole.timeline().len();
-    assert!(n > 8, "{n} batches");
-    for batches in [1, 2, n / 2, n - 1] {
-        let bytes = kept(&broken_off(Oracle::bundled(), batches));
-        let checkpoint = Checkpoint::read(&bytes[..]).unwrap();
-        let driver = Driver::new(Noise(Repeats::Samples), Oracle::bundled(), params()).unwrap();
-        let mut driver = driver.resume("noise", checkpoint).unwrap();
-        assert!(!driver.session().is_done(), "{batches}");
-        driver.run(|_, _| ()).unwrap();
-        assert!(kept(&driver) == kept(&whole), "{batches} batches");
-    }
 }
 
 /// Resumed with a larger limit, a finished render goes on; where verdicts come at the same samples whatever the limit, as
@@ -428,28 +409,11 @@ fn head(file: &[u8]) -> usize {
     52 + u64::from_le_bytes(file[12..20].try_into().unwrap()) as usize
 }
 
-/// A criterion that does not say its state.
-struct Unsaid;
-
-impl StoppingCriterion for Unsaid {
-    fn name(&self) -> String {
-        "a whim".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn judge(&mut self, _: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        Ok(vec![Verdict::default(); tiles.len()])
-    }
-}
-
 #[test]
 fn a_criterion_that_keeps_its_state_to_itself_is_not_resumed() {
-    let whim: Box<dyn StoppingCriterion + Send> = Box::new(Unsaid);
-    let driver: Driver<Noise> = broken_off(whim, 1);
+    let whim = || judging_each(Needs::default(), |_, _| Verdict::default());
+    let driver = broken_off(whim(), 1);
     let said = driver.session().checkpoint("noise").unwrap_err().to_string();
     assert!(said.contains("a whim cannot be resumed"), "{said}");
-    assert!(!Unsaid.restore(driver.session().film().grid(), &[]));
+    assert!(!whim().restore(driver.session().film().grid(), &[]));
 }

@@ -2,10 +2,8 @@
 
 use super::mask::mask_row;
 use crate::descriptor::NoiseMask;
-use crate::{
-    display::ROUNDING_LUMINANCE,
-    evidence::{HALO, Plane, TilePlanes},
-};
+use crate::evidence::{HALO, Plane, TilePlanes};
+use crate::rgb::ROUNDING_LUMINANCE;
 use std::cell::RefCell;
 
 /// Scales: full, half, quarter and eighth resolution.

@@ -22,8 +22,8 @@ use super::kind::{Described, Descriptor, DescriptorError, DescriptorKind, TileDe
 use super::texture::texture_energy;
 use super::windows::{BLOCK, PictureContrast, WindowContrast, block_count, block_sums};
 use crate::descriptor::NoiseMask;
-use crate::display::ROUNDING_LUMINANCE;
 use crate::evidence::{Plane, TilePlanes};
+use crate::rgb::ROUNDING_LUMINANCE;
 use noisefloor_vision::{
     ResidualPatch, ResidualPixels, VisibleDifference, VisionDetail, VisionModel, VisionWorkspace,
 };

@@ -22,8 +22,7 @@ pub(super) const DELTA: f64 = 1e-4;
 
 /// Squared ratio of a mean to its standard error from which it is known. With a larger one, blocks are
 /// larger, and what the picture changes by within them counts as too bright; with a smaller one, pixels
-/// are sorted by their noise, and count as too dark. Of 6 to 48, 6 to 9 did best
-/// (docs/benchmarks/stops.md).
+/// are sorted by their noise, and count as too dark. Of 6 to 48, 6 to 9 did best.
 const ENOUGH: f64 = 8.0;
 /// Edge of the blocks that are pooled first, pixel by pixel.
 pub(crate) const BLOCK: usize = 8;

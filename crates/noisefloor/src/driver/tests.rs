@@ -1,9 +1,9 @@
 use super::*;
-use crate::criterion::{FixedSpp, Needs, Verdict, View};
+use crate::criterion::{FixedSpp, Needs};
 use crate::params::Schedule;
 use crate::session::StopReason;
 use crate::source::{Reference, Repeats, SourceInfo};
-use crate::tile::Tile;
+use crate::tests::judging;
 
 /// A grey source that can be told to misbehave.
 #[derive(Default)]
@@ -155,29 +155,13 @@ fn broken_promises_are_typed_errors() {
     }
 }
 
-struct Picky;
-
-impl StoppingCriterion for Picky {
-    fn name(&self) -> String {
-        "picky".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn needs(&self) -> Needs {
-        Needs::REFERENCE
-    }
-
-    fn judge(&mut self, _: &View<'_>, _: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        Ok(vec![])
-    }
+fn picky() -> impl StoppingCriterion {
+    judging(Needs::REFERENCE, |_, _| Ok(vec![]))
 }
 
 #[test]
 fn a_missing_reference_is_an_error_before_any_sample() {
-    let mut driver = Driver::new(Grey::default(), Picky, Params { tile: 32, ..Params::default() }).unwrap();
+    let mut driver = Driver::new(Grey::default(), picky(), Params { tile: 32, ..Params::default() }).unwrap();
     let error = driver.run(|_, _| ()).unwrap_err();
     assert!(matches!(error, DriverError::Criterion(CriterionError::NoReference(_))));
     assert!(driver.source.calls.is_empty());
@@ -185,7 +169,7 @@ fn a_missing_reference_is_an_error_before_any_sample() {
 
 #[test]
 fn a_reference_is_rendered_once_before_any_sample() {
-    let mut driver = Driver::new(Grey::default(), Picky, Params { tile: 32, ..Params::default() }).unwrap();
+    let mut driver = Driver::new(Grey::default(), picky(), Params { tile: 32, ..Params::default() }).unwrap();
     driver.set_reference(|source| {
         assert!(source.calls.is_empty(), "samples came first");
         Ok(Some(Reference::new((80, 32), vec![[0.5; 3]; 80 * 32])))
@@ -198,23 +182,6 @@ fn a_reference_is_rendered_once_before_any_sample() {
     assert!(ready == 1 && !driver.source.calls.is_empty());
 }
 
-/// A criterion that fails.
-struct Broken;
-
-impl StoppingCriterion for Broken {
-    fn name(&self) -> String {
-        "broken".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn judge(&mut self, _: &View<'_>, _: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        Err(CriterionError::NoReference(self.name()))
-    }
-}
-
 /// Tile 0 has no samples at all, and no verdict comes on the others.
 #[test]
 fn stops_are_told_even_if_a_verdict_fails() {
@@ -225,7 +192,8 @@ fn stops_are_told_even_if_a_verdict_fails() {
         batches
     };
     let source = Grey { lie: Some(nothing_in_tile_0), ..Grey::default() };
-    let mut driver = Driver::new(source, Broken, Params::default().with_tile(32)).unwrap();
+    let broken = judging(Needs::default(), |_, _| Err(CriterionError::NoReference("broken".into())));
+    let mut driver = Driver::new(source, broken, Params::default().with_tile(32)).unwrap();
     let mut told = Vec::new();
     let outcome = driver.run(|_, event| {
         if let Event::TileStopped(stop) = event {

@@ -26,7 +26,6 @@ fn counts_have_a_limit() {
     film.add(1, 1 << 33, &grey).unwrap();
     for spp in [1, u64::MAX] {
         assert!(matches!(film.add(1, spp, &grey), Err(FilmError::TooMany { tile: 1, .. })), "{spp}");
-        assert!(film.add_running(1, u64::MAX, &grey).is_err());
     }
     assert_eq!(film.spp(1), (1 << 34) - 1);
 }
@@ -54,23 +53,6 @@ fn refuses_what_does_not_fit() {
     assert_eq!(film.add(2, 1, &[]), Err(FilmError::Tile(2, 2)));
     assert!(matches!(film.add(1, 1, &[[0.0; 3]; 3]), Err(FilmError::Pixels { .. })));
     assert!(matches!(film.add(1, 0, &[[0.0; 3]; 128]), Err(FilmError::NothingNew { .. })));
-    assert!(matches!(film.add_running(1, 0, &[[0.0; 3]; 128]), Err(FilmError::NothingNew { .. })));
-}
-
-#[test]
-fn running_means_equal_batches() {
-    let (mut batches, mut running) = (small(), small());
-    let (mut sum, mut total) = (0.0f64, 0u64);
-    for (n, v) in [(10u64, 1.0f32), (20, 4.0), (7, 0.5)] {
-        batches.add(1, n, &[[v; 3]; 128]).unwrap();
-        sum += n as f64 * f64::from(v);
-        total += n;
-        running.add_running(1, total, &[[(sum / total as f64) as f32; 3]; 128]).unwrap();
-    }
-    assert_eq!(batches.half_counts(1), running.half_counts(1));
-    for (a, b) in batches.image().iter().zip(running.image()) {
-        assert!((a[0] - b[0]).abs() < 1e-5);
-    }
 }
 
 /// The bound that `Half` states: 10⁹ samples in batches of 100 stay within 2.4·10⁻⁶ of the exact mean. Where
@@ -128,19 +110,6 @@ fn both_ends_of_f32_are_averaged() {
         let mean = 0.5 * (f64::from(values[0]) + f64::from(values[1]));
         let error = (f64::from(film.image()[0][0]) - mean).abs();
         assert!(error <= 1e-6 * mean.abs() + 1.5e-45, "{values:?}: {}", film.image()[0][0]);
-    }
-}
-
-proptest! {
-    #[test]
-    fn image_is_the_weighted_mean(batches in prop::collection::vec((1u64..1000, -10.0f32..1000.0), 1..20)) {
-        let mut film = small();
-        for &(n, v) in &batches {
-            film.add(1, n, &[[v; 3]; 128]).unwrap();
-        }
-        let total: f64 = batches.iter().map(|b| b.0 as f64).sum();
-        let exact = batches.iter().map(|b| b.0 as f64 * f64::from(b.1)).sum::<f64>() / total;
-        prop_assert!((f64::from(film.image()[16][0]) - exact).abs() < 1e-6 * 1000.0);
     }
 }
 

@@ -83,7 +83,7 @@ impl Model {
     /// [`ModelError`] if it is foreign, damaged, oversized, newer, older, contradicts itself, or needs
     /// another version of the descriptor.
     pub fn read(from: impl Read) -> Result<Self, ModelError> {
-        Self::read_kinds(from, &[])
+        Self::read_with(from, &[])
     }
 
     /// Reads a model whose descriptor is one of `kinds`, or built in.
@@ -92,17 +92,13 @@ impl Model {
     /// [`ModelError`] as in [`Model::read`].
     #[doc(hidden)]
     pub fn read_with(from: impl Read, kinds: &[DescriptorKind]) -> Result<Self, ModelError> {
-        Self::read_kinds(from, kinds)
-    }
-
-    fn read_kinds(from: impl Read, kinds: &[DescriptorKind]) -> Result<Self, ModelError> {
         let file: ModelFile<'_> = FORMAT.read(from)?;
         let descriptor = Descriptor::from_spec(&file.descriptor, kinds)?;
         let (needed, here) = (file.descriptor_version, descriptor.version());
         if needed != here {
             return Err(ModelError::Descriptor { name: descriptor.name(), needed, here });
         }
-        Self::of(ModelParts {
+        Self::new(ModelParts {
             descriptor,
             evidence: file.evidence,
             tone_mapping: file.tone_mapping,

@@ -222,7 +222,7 @@ fn another_audience_sees_the_noise_of_fewer_samples() {
 #[test]
 fn an_unknown_exposure_is_part_of_the_share_of_people() {
     let judge = |film: &Film, error: f64| {
-        let view = View::new(film, &Display::SRGB).exposed_within(error);
+        let view = View { exposure_error: error, ..View::new(film, &Display::SRGB) };
         Oracle::bundled().judge(&view, &[film.grid().tile(0)]).unwrap()[0]
     };
     let noisy = film(1_500, 0.5);

@@ -1,6 +1,7 @@
 use super::*;
 use crate::criterion::{FixedSpp, Needs};
 use crate::params::Schedule;
+use crate::tests::judging;
 
 /// Says "converged" from given samples on, with halves or without.
 struct From {
@@ -44,13 +45,18 @@ fn session(samples: u64, halves: bool, params: Params) -> Session<From> {
     Session::new(80, 32, From { samples, halves, asked: vec![] }, Params { tile: 32, ..params }).unwrap()
 }
 
+/// Pushes a grey picture as it is asked for, and judges.
+fn round<C: StoppingCriterion>(session: &mut Session<C>) -> Result<Vec<Stop>, SessionError> {
+    for r in session.requests() {
+        assert_eq!(r.first, session.film().spp(r.tile.index));
+        session.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()])?;
+    }
+    session.judge()
+}
+
 fn run(session: &mut Session<From>) -> Vec<(u64, StopReason)> {
     while !session.is_done() {
-        for r in session.requests() {
-            assert_eq!(r.first, session.film().spp(r.tile.index));
-            session.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()]).unwrap();
-        }
-        session.judge().unwrap();
+        round(session).unwrap();
     }
     session.stops().map(|s| (s.spp, s.reason)).collect()
 }
@@ -115,44 +121,22 @@ fn a_less_demanding_audience_gets_less() {
     assert_eq!(run(&mut s).map_samples(), [150, 300, 450]);
 }
 
-/// Satisfied at once, but fails at one call.
-struct Moody {
-    fails_at: u32,
-    calls: u32,
-}
-
-impl StoppingCriterion for Moody {
-    fn name(&self) -> String {
-        "moody".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        self.calls += 1;
-        if self.calls == self.fails_at {
-            return Err(CriterionError::NoReference(self.name()));
-        }
-        Ok(tiles.iter().map(|tile| Verdict::new(tile.index == 0 || view.film.spp(0) > 200)).collect())
-    }
-}
-
 /// Tile 0 waits for what a demanding audience wants, and has it when the verdict on the others fails.
 #[test]
 fn a_stop_is_filed_only_if_it_is_returned() {
     let audience = Audience { slope: 1.1, offset: 0.0 };
     let params = Params { tile: 32, audience, ..steps_of_10() };
-    let mut s = Session::new(70, 32, Moody { fails_at: 2, calls: 0 }, params).unwrap();
-    let push = |s: &mut Session<Moody>| {
-        for r in s.requests() {
-            s.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()]).unwrap();
+    let mut calls = 0;
+    let moody = judging(Needs::default(), move |view, tiles| {
+        calls += 1;
+        if calls == 2 {
+            return Err(CriterionError::NoReference("moody".into()));
         }
-        s.judge()
-    };
-    assert_eq!(push(&mut s), Ok(Vec::new()));
-    assert!(matches!(push(&mut s), Err(SessionError::Criterion(_))));
+        Ok(tiles.iter().map(|tile| Verdict::new(tile.index == 0 || view.film.spp(0) > 200)).collect())
+    });
+    let mut s = Session::new(70, 32, moody, params).unwrap();
+    assert_eq!(round(&mut s), Ok(Vec::new()));
+    assert!(matches!(round(&mut s), Err(SessionError::Criterion(_))));
     assert_eq!(s.stops().count(), 0);
     assert_eq!(s.judge().unwrap().len(), 1);
 }
@@ -206,12 +190,7 @@ fn nothing_is_judged_before_every_tile_has_samples() {
 #[test]
 fn closing_keeps_what_is_done() {
     let mut s = session(100, true, steps_of_10());
-    for _ in 0..2 {
-        for r in s.requests() {
-            s.push(r.tile.index, r.spp, &vec![[0.3; 3]; r.tile.pixels()]).unwrap();
-        }
-    }
-    assert_eq!(s.judge().unwrap().len(), 1);
+    assert_eq!([0, 1].map(|_| round(&mut s).unwrap().len()), [0, 1]);
     assert_eq!(s.close_all(Interruption::TimeLimit).len(), 2);
     let reasons: Vec<_> = s.stops().map(|s| s.reason).collect();
     assert_eq!(reasons, [StopReason::Converged, StopReason::TimeLimit, StopReason::TimeLimit]);
@@ -354,13 +333,7 @@ fn many_tiles_that_are_opened_again_take_no_larger_steps_than_many_that_are_open
     let params =
         Params::default().with_tile(16).with_min_spp(32).with_schedule(Schedule::Growing { step: 16 });
     let mut session = Session::new(160, 16, Opens(vec![]), params).unwrap();
-    for _ in 0..2 {
-        for request in session.requests() {
-            let mean = vec![[0.3; 3]; request.tile.pixels()];
-            session.push(request.tile.index, request.spp, &mean).unwrap();
-        }
-        session.judge().unwrap();
-    }
+    (0..2).for_each(|_| drop(round(&mut session).unwrap()));
     assert_eq!(session.open_tiles(), 10);
     let goals: Vec<u64> = session.requests().iter().map(|request| request.first + request.spp).collect();
     assert_eq!(goals[..9], [48; 9]);

@@ -168,7 +168,6 @@ fn ordinary_noise_hides_nothing() {
             let most = most(&film([&halves[0], &halves[1]], [samples; 2]));
             let noise = spread / (2.0 * samples as f64).sqrt();
             // In sixty synthetic pictures it was a five-thousandth of the noise at the most
-            // (docs/benchmarks/stops.md)
             assert!(most < 1e-3 * noise.max(1e-9), "{samples}, {spread}: {most} with noise of {noise}");
         }
     }

@@ -87,27 +87,20 @@ fn borders(grid: TileGrid, mix_up: MixUp, torn: usize) -> (Vec<Border>, Vec<Bord
         now.push(is);
         then.push(would_be);
     };
-    if matches!(mix_up, MixUp::UpsideDown | MixUp::Turned) {
-        below().for_each(|(column, a, b)| {
-            let (a, b) = (at(column, a), at(column, b));
-            see([(a, Bottom), (b, Top)], [(a, Top), (b, Bottom)]);
-        });
-    }
-    if matches!(mix_up, MixUp::Mirrored | MixUp::Turned) {
-        beside().for_each(|(a, b, row)| {
-            let (a, b) = (at(a, row), at(b, row));
-            see([(a, Right), (b, Left)], [(a, Left), (b, Right)]);
-        });
-    }
     // Tiles counted column by column have, in a square grid, the same borders as tiles whose pixels are
-    if mix_up == MixUp::Transposed {
+    let transposed = mix_up == MixUp::Transposed;
+    if transposed || matches!(mix_up, MixUp::UpsideDown | MixUp::Turned) {
         below().for_each(|(column, a, b)| {
             let (a, b) = (at(column, a), at(column, b));
-            see([(a, Bottom), (b, Top)], [(a, Right), (b, Left)]);
+            let would_be = if transposed { [(a, Right), (b, Left)] } else { [(a, Top), (b, Bottom)] };
+            see([(a, Bottom), (b, Top)], would_be);
         });
+    }
+    if transposed || matches!(mix_up, MixUp::Mirrored | MixUp::Turned) {
         beside().for_each(|(a, b, row)| {
             let (a, b) = (at(a, row), at(b, row));
-            see([(a, Right), (b, Left)], [(a, Bottom), (b, Top)]);
+            let would_be = if transposed { [(a, Bottom), (b, Top)] } else { [(a, Left), (b, Right)] };
+            see([(a, Right), (b, Left)], would_be);
         });
     }
     if mix_up == MixUp::Shifted && columns > 1 {

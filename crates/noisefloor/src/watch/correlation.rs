@@ -2,7 +2,7 @@
 
 use super::said::{CERTAIN, FACTOR, Fault, NOTABLE, STRONG, Warning};
 use super::shift::Shift;
-use super::values::{Ends, Values};
+use super::values::Ends;
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
@@ -23,8 +23,7 @@ const LIKELY: f64 = 2.0;
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Correlation {
-    sum: f64,
-    squares: f64,
+    terms: Mean,
     left: f64,
     right: f64,
 }
@@ -33,9 +32,7 @@ impl Correlation {
     pub(super) fn of(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
         let mut all = Self::default();
         for (x, y) in pairs {
-            let term = x * y;
-            all.sum += term;
-            all.squares += term * term;
+            all.terms.see(x * y);
             all.left += x * x;
             all.right += y * y;
         }
@@ -43,21 +40,15 @@ impl Correlation {
     }
 
     pub(super) fn add(&mut self, more: &Self) {
-        self.sum += more.sum;
-        self.squares += more.squares;
+        self.terms.add(&more.terms);
         self.left += more.left;
         self.right += more.right;
-    }
-
-    /// Standard errors from 0.
-    fn z(&self) -> f64 {
-        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
     }
 
     /// −1…1.
     fn value(&self) -> f64 {
         let size = (self.left * self.right).sqrt();
-        if size > 0.0 { self.sum / size } else { 0.0 }
+        if size > 0.0 { self.terms.sum / size } else { 0.0 }
     }
 }
 
@@ -66,8 +57,7 @@ impl Correlation {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "files", derive(Serialize, Deserialize))]
 pub(super) struct Concordance {
-    sum: f64,
-    squares: f64,
+    terms: Mean,
     sizes: f64,
 }
 
@@ -86,30 +76,23 @@ impl Concordance {
     fn sized(products: impl Iterator<Item = (f64, f64)>, as_one: bool) -> Self {
         let mut all = Self::default();
         for (product, size) in products {
-            all.sum += size.copysign(product);
-            all.squares += size * size;
+            all.terms.see(size.copysign(product));
             all.sizes += size;
         }
         if as_one {
-            all.squares = all.sum * all.sum;
+            all.terms.squares = all.terms.sum * all.terms.sum;
         }
         all
     }
 
     pub(super) fn add(&mut self, more: &Self) {
-        self.sum += more.sum;
-        self.squares += more.squares;
+        self.terms.add(&more.terms);
         self.sizes += more.sizes;
-    }
-
-    /// Standard errors from 0.
-    fn z(&self) -> f64 {
-        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
     }
 
     /// −1…1: 1 if all signs agree.
     fn value(&self) -> f64 {
-        if self.sizes > 0.0 { self.sum / self.sizes } else { 0.0 }
+        if self.sizes > 0.0 { self.terms.sum / self.sizes } else { 0.0 }
     }
 }
 
@@ -248,7 +231,7 @@ impl Sums {
 
     /// Standard errors from 0, with care.
     fn z(&self, of: &Concordance) -> f64 {
-        of.z() / self.widening()
+        of.terms.z() / self.widening()
     }
 
     /// The correlation of batches and its z: the smaller ones of all noise and of that which pixels have for
@@ -318,12 +301,12 @@ impl Sums {
         let r = self.nested.value();
         let noise = (1.0 + 3.0 * r * r + r * (12.0 + 4.0 * r * r).sqrt()) / (1.0 - r * r);
         let noisier = !shared
-            && self.nested.z().abs() / self.widening() > CERTAIN
+            && self.nested.terms.z().abs() / self.widening() > CERTAIN
             && !(1.0 / FACTOR..FACTOR).contains(&noise);
         if noisier {
             warnings.push(Warning::Noise(noise.max(0.0)));
         }
-        let (z, beside) = (self.neighbours.z(), self.neighbours.value());
+        let (z, beside) = (self.neighbours.terms.z(), self.neighbours.value());
         if !shared && z.abs() > CERTAIN && beside.abs() > NOTABLE {
             warnings.push(Warning::Neighbours(beside));
         }
@@ -351,10 +334,5 @@ impl Sums {
         let alike = (0.5..2.0).contains(&(early.sum / late.sum));
         let fades = early.z() / self.widening() > CERTAIN && late.z() / self.widening() > LIKELY && alike;
         fades.then_some(early.sum / late.sum)
-    }
-
-    /// Noise that ends at 1, where nothing is above 1.
-    pub(super) fn clipped(&self, values: &Values) -> Option<Warning> {
-        self.ends.clipped(values).map(Warning::Clipped)
     }
 }

@@ -61,12 +61,7 @@ impl LightCheck {
     /// # Errors
     /// [`ImpossibleLight`].
     pub fn check(&mut self, pixels: &[Rgb]) -> Result<(), ImpossibleLight> {
-        self.check_all(pixels.iter().copied())
-    }
-
-    /// Whether most pixels are finite, and the light of those on average not less than none.
-    fn check_all(&mut self, pixels: impl Iterator<Item = Rgb>) -> Result<(), ImpossibleLight> {
-        let seen = SeenLight::of(pixels);
+        let seen = SeenLight::of(pixels.iter().copied());
         let brightest = self.brightest.max(seen.brightest);
         seen.check(brightest)?;
         // Light that was refused is no measure of what comes later
@@ -122,7 +117,7 @@ impl SeenLight {
         let mut seen = Self::default();
         for pixel in pixels {
             seen.all += 1;
-            if is_finite(&pixel) {
+            if pixel.iter().all(|channel| channel.is_finite()) {
                 let light = f64::from(luminance(pixel));
                 (seen.sum, seen.finite) = (seen.sum + light, seen.finite + 1);
                 seen.brightest = seen.brightest.max(light);
@@ -154,10 +149,6 @@ impl SeenLight {
     pub(super) fn is_of_nothing(self) -> bool {
         self.all == 0
     }
-}
-
-fn is_finite(pixel: &Rgb) -> bool {
-    pixel.iter().all(|channel| channel.is_finite())
 }
 
 #[cfg(test)]

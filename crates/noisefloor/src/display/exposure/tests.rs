@@ -182,7 +182,7 @@ fn one_picture_alone_does_as_well_without_edges() {
         let found = of_one(&truth);
         assert!(off(found, &truth).abs() < 0.02, "{}, {found:?}", off(found, &truth));
     }
-    // Where most of a picture is noise, its own changes are not to be told from it: see docs/known-issues.md
+    // Where most of a picture is noise, its own changes are not to be told from it
     let truth = waves();
     for (seed, share) in [0.9, 0.5, 0.25].into_iter().enumerate() {
         assert_sound(of_one(&mean(&met(&truth, |_| share, 40 + seed as u64))), &truth, share);

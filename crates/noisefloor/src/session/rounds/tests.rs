@@ -1,33 +1,16 @@
-use crate::criterion::{CriterionError, StoppingCriterion, Verdict, View};
+use crate::criterion::{Needs, StoppingCriterion, Verdict};
 use crate::film::Film;
-use crate::{FixedSpp, Params, Request, Schedule, Session, Stop, Tile, criterion::Needs};
+use crate::tests::judging_each;
+use crate::{FixedSpp, Params, Request, Schedule, Session, Stop};
 use proptest::prelude::*;
 
 /// Later tiles need more; keeps halves, and looks at the samples of the whole picture, as the oracle does.
-struct Neighbours;
-
-impl StoppingCriterion for Neighbours {
-    fn name(&self) -> String {
-        "neighbours".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn needs(&self) -> Needs {
-        Needs::HALVES
-    }
-
-    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
+fn neighbours() -> impl StoppingCriterion {
+    judging_each(Needs::HALVES, |view, tile| {
         let others = view.film.total_samples() / 1_000_000;
-        let verdict = |tile: &Tile| {
-            let enough = 150 * (tile.index as u64 + 1) + others % 50;
-            let (converged, expected_spp) = (view.film.spp(tile.index) >= enough, Some(enough));
-            Verdict { converged, expected_spp, ..Verdict::default() }
-        };
-        Ok(tiles.iter().map(verdict).collect())
-    }
+        let enough = 150 * (tile.index as u64 + 1) + others % 50;
+        Verdict::new(view.film.spp(tile.index) >= enough).expecting(Some(enough))
+    })
 }
 
 /// A batch that depends on its request alone, and rounds.
@@ -46,7 +29,7 @@ fn bits(film: &Film) -> Vec<u32> {
 /// Renders, choosing what to sample next as `choose` says.
 fn render(schedule: Schedule, mut choose: impl FnMut(usize) -> usize) -> (Vec<u32>, Vec<Stop>) {
     let params = Params { tile: 512, schedule, max_spp: 500, ..Params::default() };
-    let mut session = Session::new(700, 600, Neighbours, params).unwrap();
+    let mut session = Session::new(700, 600, neighbours(), params).unwrap();
     while !session.is_done() {
         let batches = session.next_batches();
         match batches.len() {
@@ -74,7 +57,7 @@ proptest! {
 #[test]
 fn batches_ahead_are_those_to_come() {
     let params = Params { tile: 512, min_spp: 100, max_spp: 1000, ..Params::default() };
-    let mut session = Session::new(2048, 1024, Neighbours, params).unwrap();
+    let mut session = Session::new(2048, 1024, neighbours(), params).unwrap();
     let mut asked: Vec<Vec<Request>> = vec![Vec::new(); 8];
     let mut ahead = vec![Vec::new(); 8];
     while !session.is_done() {

@@ -1,14 +1,13 @@
-use crate::checkpoint::Checkpoint;
-use crate::criterion::{CriterionError, Needs, View};
+use crate::criterion::Needs;
 use crate::evidence::{Evidence, Samples};
 use crate::stills::{SnapshotPair, Still};
+use crate::tests::judging_each;
 use crate::{
     Batch, Driver, Event, FixedSpp, Oracle, Params, ProgressiveSource, Repeats, Request, Rgb, Schedule,
-    Session, SourceError, SourceInfo, Stop, StopReason, StoppingCriterion, Tile, ToneMapping, Verdict,
+    Session, SourceError, SourceInfo, Stop, StopReason, StoppingCriterion, ToneMapping, Verdict,
     display::Display,
 };
 use noisefloor_testkit::Noise;
-use std::sync::atomic::Ordering;
 
 const SIZE: (usize, usize) = (96, 64);
 /// What the left half has of the light of the right one.
@@ -48,30 +47,8 @@ impl ProgressiveSource for Room {
 }
 
 /// Is satisfied with anything, as soon as the exposure is known to 1.5 %.
-struct Hasty {
-    halves: bool,
-}
-
-impl StoppingCriterion for Hasty {
-    fn name(&self) -> String {
-        "hasty".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn needs(&self) -> Needs {
-        Needs { halves: self.halves, reference: false }
-    }
-
-    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        Ok(vec![Verdict::new(view.exposure_error <= 0.015).with_probability(1.0); tiles.len()])
-    }
-
-    fn state(&self) -> Option<Vec<u8>> {
-        Some(Vec::new())
-    }
+fn hasty() -> impl StoppingCriterion {
+    judging_each(Needs::HALVES, |view, _| Verdict::new(view.exposure_error <= 0.015).with_probability(1.0))
 }
 
 fn params() -> Params {
@@ -111,7 +88,7 @@ fn the_first_stop_is_at_the_exposure_of_the_finished_picture() {
     all.extend([2, 100].map(|min| params().with_min_spp(min)));
     all.push(params().with_consecutive(3));
     for params in all {
-        for exposure in exposures(Hasty { halves: true }, params.clone()) {
+        for exposure in exposures(hasty(), params.clone()) {
             assert_close(exposure, &format!("{params:?}"));
         }
     }
@@ -123,26 +100,6 @@ fn the_oracle_looks_at_the_dark_half_as_it_will_be_seen() {
     for exposure in exposures(Oracle::bundled(), params) {
         assert_close(exposure, "oracle");
     }
-}
-
-#[test]
-fn the_order_of_tiles_changes_nothing() {
-    let run = |choose: &mut dyn FnMut(usize) -> usize| {
-        let mut session = Session::new(SIZE.0, SIZE.1, Hasty { halves: true }, params()).unwrap();
-        while !session.is_done() {
-            let batches = session.next_batches();
-            if batches.is_empty() {
-                session.judge().unwrap();
-            } else {
-                let Batch { tile, spp, mean } = Room.batch(&batches[choose(batches.len())]);
-                session.push(tile.index, spp, &mean).unwrap();
-            }
-        }
-        (session.stops().collect::<Vec<_>>(), session.display().cloned())
-    };
-    let (forwards, mut order) = (run(&mut |_| 0), Noise::keyed(&[51]));
-    assert_eq!(run(&mut |n| n - 1), forwards);
-    assert_eq!(run(&mut |n| (order.uniform() * n as f64) as usize), forwards);
 }
 
 /// A wall between two rooms: the left one stays black for long, and then turns out to be lit.
@@ -161,36 +118,17 @@ impl LateLight {
 }
 
 /// Wants eight samples times the exposure of the right tile, and 400 of the left one.
-struct ByExposure;
-
-impl StoppingCriterion for ByExposure {
-    fn name(&self) -> String {
-        "by exposure".into()
-    }
-
-    fn fingerprint(&self) -> String {
-        self.name()
-    }
-
-    fn needs(&self) -> Needs {
-        Needs::HALVES
-    }
-
-    fn judge(&mut self, view: &View<'_>, tiles: &[Tile]) -> Result<Vec<Verdict>, CriterionError> {
-        let verdict = |tile: &Tile| {
-            let need = if tile.index == 0 { 400 } else { (8.0 * view.display.exposure() / 0.18) as u64 };
-            let probability = 0.1 / view.display.exposure();
-            Verdict::new(view.film.spp(tile.index) >= need)
-                .expecting(Some(need.max(view.film.spp(tile.index) + 1)))
-                .with_probability(probability)
-        };
-        Ok(tiles.iter().map(verdict).collect())
-    }
+fn by_exposure() -> impl StoppingCriterion {
+    judging_each(Needs::HALVES, |view, tile| {
+        let (spp, exposure) = (view.film.spp(tile.index), view.display.exposure());
+        let need = if tile.index == 0 { 400 } else { (8.0 * exposure / 0.18) as u64 };
+        Verdict::new(spp >= need).expecting(Some(need.max(spp + 1))).with_probability(0.1 / exposure)
+    })
 }
 
 #[test]
 fn what_stopped_under_another_exposure_is_looked_at_again() {
-    let mut session = Session::new(64, 32, ByExposure, params()).unwrap();
+    let mut session = Session::new(64, 32, by_exposure(), params()).unwrap();
     LateLight::push(&mut session, 0.0);
     // What is black is left out
     let first = session.judge().unwrap();
@@ -222,7 +160,7 @@ fn what_stopped_under_another_exposure_is_looked_at_again() {
 #[test]
 fn a_display_that_was_set_stays() {
     for display in [Display::SRGB, ToneMapping::Srgb { exposure: 3.0 }.settle(&[])] {
-        let mut session = Session::new(SIZE.0, SIZE.1, Hasty { halves: true }, params()).unwrap();
+        let mut session = Session::new(SIZE.0, SIZE.1, hasty(), params()).unwrap();
         session.set_display(display.clone()).unwrap();
         while !session.is_done() {
             for request in session.requests() {
@@ -249,42 +187,10 @@ fn counting_waits_for_no_exposure() {
     assert_eq!(driver.session().display(), Some(&driver.session().display_so_far()));
 }
 
-#[test]
-fn a_session_that_is_resumed_settles_as_if_it_had_not_been() {
-    let begin = || Driver::new(Room, Hasty { halves: true }, params().with_consecutive(2)).unwrap();
-    let outcome = |driver: &Driver<Room, Hasty>| {
-        let film = driver.session().film().image();
-        (driver.session().stops().collect::<Vec<_>>(), driver.session().display().cloned(), film)
-    };
-    let mut whole = begin();
-    whole.run(|_, _| ()).unwrap();
-    let (mut at, mut was_cut) = (1, true);
-    while was_cut {
-        let mut cut = begin();
-        let (cancel, mut left) = (cut.cancel_flag(), at);
-        let mut count = |event: &Event| {
-            if matches!(event, Event::BatchDone(_)) {
-                left -= 1;
-                cancel.store(left == 0, Ordering::Relaxed);
-            }
-        };
-        cut.run(|_, event| count(event)).unwrap();
-        was_cut = cut.session().stops().any(|stop| stop.reason == StopReason::Cancelled);
-        let mut file = Vec::new();
-        cut.session().checkpoint("room").unwrap().write(&mut file).unwrap();
-        let mut resumed = begin().resume("room", Checkpoint::read(&file[..]).unwrap()).unwrap();
-        resumed.run(|_, _| ()).unwrap();
-        assert_eq!(outcome(&resumed), outcome(&whole), "cut after {at}");
-        at += 1;
-    }
-    assert!(at > 3, "{at}");
-}
-
 /// The two halves of a film are two renderings.
 #[test]
 fn two_pictures_are_judged_at_the_exposure_of_their_render() {
-    let mut session =
-        Session::new(SIZE.0, SIZE.1, Hasty { halves: true }, params().with_min_spp(64)).unwrap();
+    let mut session = Session::new(SIZE.0, SIZE.1, hasty(), params().with_min_spp(64)).unwrap();
     while session.display().is_none() {
         for request in session.requests() {
             let Batch { tile, spp, mean } = Room.batch(&request);
