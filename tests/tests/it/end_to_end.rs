@@ -190,18 +190,6 @@ fn limits_have_their_reasons() {
         }
     }
     assert!(limited.samples().contains(&150));
-
-    // Cancelled after the first batch: what is there stays
-    let mut driver = Driver::new(cornell(), Oracle::bundled(), small_tiles()).unwrap();
-    let flag = driver.cancel_flag();
-    driver
-        .run(|_, event| {
-            flag.fetch_or(matches!(event, Event::BatchDone(_)), Ordering::Relaxed);
-        })
-        .unwrap();
-    let outcome = Outcome::of(driver.session());
-    assert!(outcome.stops.iter().all(|s| s.reason == StopReason::Cancelled && s.spp == 8), "{outcome:?}");
-    assert!(outcome.image.iter().flatten().any(|&c| c > 0.0));
 }
 
 #[test]

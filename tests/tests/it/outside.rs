@@ -520,28 +520,6 @@ fn an_object_before_a_detailed_background_is_no_fault() {
     }
 }
 
-/// The same noise in every batch never looks converged, however it is pushed.
-#[test]
-fn one_seed_for_all_batches_is_never_converged() {
-    let one_seed = |at, _, spp| sample(1, at, 0, spp);
-    let mut session = Session::new(EDGE, EDGE, Oracle::bundled(), params()).unwrap();
-    let error = render(&mut session, &one_seed).unwrap_err();
-    assert!(matches!(error, SessionError::Fault(Fault::Repeated { .. })), "{error}");
-    assert!(session.film().spp(0) <= 64 && session.stops().count() == 0);
-    let mut session = Session::new(EDGE, EDGE, Oracle::bundled(), params()).unwrap();
-    let image = picture(1, 0, 16);
-    for _ in 0..20 {
-        session.push_image(16, &image).unwrap();
-        session.judge().unwrap();
-        assert_eq!(session.stops().count(), 0);
-    }
-    assert!(
-        matches!(session.warnings()[..], [Warning::Repeated { tiles: 4, of: 4 }]),
-        "{:?}",
-        session.warnings()
-    );
-}
-
 // Limits and sizes
 
 #[test]
