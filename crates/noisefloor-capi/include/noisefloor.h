@@ -422,21 +422,6 @@ NfStatus nf_session_next_pass(const NfSession *session,
 NfStatus nf_session_judge(const NfSession *session,
                           size_t *newly_done);
 
-// Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
-// tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
-// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
-// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
-// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
-// values are interpolated linearly. NF_STATUS_ARGUMENT if the values are no display values, such as those of 8 bits. The
-// session owns what it needs of the table.
-NfStatus nf_session_set_tone_table(const NfSession *session,
-                                   float exposure,
-                                   float toe,
-                                   float top,
-                                   const float *table,
-                                   size_t floats,
-                                   size_t edge);
-
 // Just-objectionable differences that each tile to be shown has lost, by its last verdict: a double for each tile, NaN
 // before the first, into an array for at least as many (capacity says how many). NF_STATUS_UNAVAILABLE if the session
 // has no denoiser.
@@ -483,8 +468,12 @@ NfStatus nf_tone_of_cube(const char *text,
                          const char *input,
                          NfTone **tone);
 
-// A table: see nf_session_set_tone_table. The caller frees it with nf_tone_free, parameters and sessions keep what they
-// need.
+// A table of display values over radiance, such as a filmic curve, with edge entries along each axis, 2 to 65, red
+// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
+// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
+// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
+// values are interpolated linearly. NF_STATUS_ARGUMENT if the values are no display values, such as those of 8 bits. The
+// caller frees it with nf_tone_free, parameters and sessions keep what they need.
 NfStatus nf_tone_of_table(float toe,
                           float top,
                           const float *table,

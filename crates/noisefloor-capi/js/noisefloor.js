@@ -301,7 +301,7 @@ const tables = new Map();
 
 export function toneTable(curve) {
   if (!tables.has(curve)) {
-    // nf_session_set_tone_table: log2 made linear between powers of two
+    // nf_tone_of_table: log2 made linear between powers of two
     const axis = Array.from({ length: EDGE }, (_, i) => {
       const stops = (STOPS * i) / (EDGE - 1);
       return TOE * (2 ** Math.floor(stops) * (1 + (stops % 1)) - 1);
@@ -353,7 +353,6 @@ const position = (names, name, what) => {
   return place;
 };
 
-/** Options by the names of the header. Those not given keep the defaults of Rust. */
 /** What a session can be told; a slip of the pen would leave the default in place. */
 const OPTIONS = {
   "": [
@@ -375,8 +374,8 @@ function known(options) {
   }
 }
 
-function fields({ tile, schedule, step, minSpp, maxSpp, consecutive, audience, toneMapping }) {
-  const linear = toneMapping?.curve === "linear";
+/** Options by the names of the header. Those not given keep the defaults of Rust. */
+function fields({ tile, schedule, step, minSpp, maxSpp, consecutive, audience, toneMapping }, tone) {
   return {
     tile,
     schedule: schedule === undefined ? undefined : position(SCHEDULES, schedule, "schedule"),
@@ -388,9 +387,29 @@ function fields({ tile, schedule, step, minSpp, maxSpp, consecutive, audience, t
     audience_offset: audience?.offset,
     key: toneMapping?.key,
     white: toneMapping?.white,
-    tone_mapping: linear ? SRGB : undefined,
-    exposure: linear ? toneMapping.exposure : undefined,
+    tone_mapping: toneMapping?.curve === "linear" ? SRGB : undefined,
+    exposure: toneMapping?.curve ? toneMapping.exposure : undefined,
+    tone,
   };
+}
+
+/** Makes what `use` needs of a curve, and frees it then: sessions keep what they need. */
+function withTone({ curve = "linear" } = {}, use) {
+  if (curve === "linear") return use(undefined);
+  const known = typeof curve === "string" ? curves[curve] : curve;
+  const made = known instanceof Float32Array; // a table of toneTable(), from background.js
+  if (!made && typeof known !== "function") {
+    position(["linear", ...Object.keys(curves)], curve, "tone curve");
+  }
+  const table = made ? known : toneTable(known);
+  const tone = withBytes(new Uint8Array(table.buffer), (at) =>
+    out("size_t", (place) => call("nf_tone_of_table", TOE, TOP, at, table.length, EDGE, place)),
+  );
+  try {
+    return use(tone);
+  } finally {
+    wasm.nf_tone_free(tone);
+  }
 }
 
 const forgotten = new FinalizationRegistry(({ handle, name }) => {
@@ -418,10 +437,10 @@ export class Session {
     this.#onWarning = options.onWarning ?? ((text) => console.warn(`noisefloor: ${text}`));
     const size = [Number(whole(width, "width", 2 ** 32)), Number(whole(height, "height", 2 ** 32))];
     const shape = STRUCTS.NfParams;
-    this.#handle = withOracle(options.people ?? PEOPLE, (oracle) =>
+    const make = (oracle, tone) =>
       withMemory(shape.size, (params) => {
         call("nf_params_default", params);
-        writeStruct("NfParams", params, fields(options));
+        writeStruct("NfParams", params, fields(options, tone));
         this.maxSpp = readStruct("NfParams", params).max_spp;
         const make = (place) => call("nf_session_new", ...size, oracle, params, place);
         if (options.viewing === undefined) return out("size_t", make);
@@ -430,7 +449,9 @@ export class Session {
           view().setUint32(params + at, viewing, true);
           return out("size_t", make);
         });
-      }),
+      });
+    this.#handle = withTone(options.toneMapping, (tone) =>
+      withOracle(options.people ?? PEOPLE, (oracle) => make(oracle, tone)),
     );
     forgotten.register(
       this,
@@ -440,7 +461,6 @@ export class Session {
     try {
       if (options.sharedPixels) this.#call("nf_session_share_pixels", 1);
       if (options.linear) this.#call("nf_session_set_linear");
-      if (options.toneMapping?.curve) this.#setCurve(options.toneMapping);
     } catch (error) {
       this.close();
       throw error;
@@ -467,19 +487,6 @@ export class Session {
       if (error.code === "INTERNAL") this.#broken = error;
       throw error;
     }
-  }
-
-  #setCurve({ curve, exposure = 1 }) {
-    if (curve === "linear") return;
-    const known = typeof curve === "string" ? curves[curve] : curve;
-    const made = known instanceof Float32Array; // a table of toneTable(), from background.js
-    if (!made && typeof known !== "function") {
-      position(["linear", ...Object.keys(curves)], curve, "tone curve");
-    }
-    const table = made ? known : toneTable(known);
-    withBytes(new Uint8Array(table.buffer), (at) =>
-      this.#call("nf_session_set_tone_table", exposure, TOE, TOP, at, table.length, EDGE),
-    );
   }
 
   get tiles() {

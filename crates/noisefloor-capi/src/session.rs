@@ -6,10 +6,8 @@ use crate::handle;
 use crate::oracle::NfOracle;
 use crate::params::NfParams;
 use crate::status::{Failure, NfStatus, guard, not_while_denoising};
-use crate::tone::curve;
 use noisefloor::{
-    Checkpoint, Oracle, Params, Request, Rgb, Schedule, Session, StoppingCriterion, Tile, TileGrid,
-    ToneMapping, Verdict,
+    Checkpoint, Oracle, Params, Request, Rgb, Schedule, Session, StoppingCriterion, Tile, TileGrid, Verdict,
 };
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
@@ -311,33 +309,6 @@ pub unsafe extern "C" fn nf_session_judge(session: *const NfSession, newly_done:
         }
         // SAFETY: not null, and promised by the caller.
         unsafe { border::write(newly_done, stops.len(), "newly_done") }
-    })
-}
-
-/// Displays radiance by a table of the caller's own, such as a filmic curve, before the first verdict: then
-/// tone_mapping and exposure of NfParams count no more. table has edge entries along each axis, 2 to 65, red
-/// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
-/// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
-/// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
-/// values are interpolated linearly. NF_STATUS_ARGUMENT if the values are no display values, such as those of 8 bits. The
-/// session owns what it needs of the table.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn nf_session_set_tone_table(
-    session: *const NfSession,
-    exposure: f32,
-    toe: f32,
-    top: f32,
-    table: *const f32,
-    floats: usize,
-    edge: usize,
-) -> NfStatus {
-    guard(|| {
-        let session = handle::get(session)?;
-        // SAFETY: promised by the caller.
-        let curve = unsafe { curve((toe, top), table, floats, edge) }?;
-        let tone = ToneMapping::Custom { exposure, curve };
-        tone.check().map_err(|error| Failure::new(NfStatus::Argument, error.to_string()))?;
-        Ok(session.lock()?.set_display(tone.settle(&[]))?)
     })
 }
 

@@ -197,30 +197,47 @@ fn tiles_of_a_whole_picture_are_cut_out() {
     assert!(far < 1e-6, "{far}");
 }
 
+/// Whether its checkpoint was a file or stood in memory.
 #[test]
 fn a_resumed_session_ends_as_the_uninterrupted_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = CString::new(folder.path().join("session.nfc").to_str().unwrap()).unwrap();
     let whole = session(&params());
     round(&whole, 1);
-    // SAFETY: living handles, and text.
+    let (job, mut size) = (c"wall".as_ptr(), 0);
+    // SAFETY: living handles, text, and arrays of the sizes given.
     unsafe {
-        ok(nf_session_save(whole.0, c"wall".as_ptr(), path.as_ptr()));
-        let other = session(&params());
+        ok(nf_session_save(whole.0, job, path.as_ptr()));
+        let [other, restored] = [session(&params()), session(&params())];
         assert_eq!(nf_session_resume(other.0, c"hall".as_ptr(), path.as_ptr()), NfStatus::Checkpoint);
         assert!(message().contains("its job is wall, not hall"), "{}", message());
         assert_eq!(states(&other)[0].spp, 0, "a failure changes nothing");
-        ok(nf_session_resume(other.0, c"wall".as_ptr(), path.as_ptr()));
-        assert_eq!(nf_session_resume(other.0, c"wall".as_ptr(), c"/nowhere/at/all".as_ptr()), NfStatus::Io);
-        for session in [&whole, &other] {
+        ok(nf_session_resume(other.0, job, path.as_ptr()));
+        assert_eq!(nf_session_resume(other.0, job, c"/nowhere/at/all".as_ptr()), NfStatus::Io);
+
+        let saved = std::fs::read(folder.path().join("session.nfc")).unwrap();
+        ok(nf_session_checkpoint(whole.0, job, null_mut(), 0, &mut size));
+        assert_eq!(size, saved.len());
+        let mut bytes = vec![0; size];
+        let short = nf_session_checkpoint(whole.0, job, bytes.as_mut_ptr(), size - 1, &mut size);
+        assert_eq!(short, NfStatus::Size, "{}", message());
+        ok(nf_session_checkpoint(whole.0, job, bytes.as_mut_ptr(), bytes.len(), &mut size));
+        assert!(bytes == saved);
+        let cut = nf_session_restore(restored.0, job, bytes.as_ptr(), size - 1);
+        assert_eq!(cut, NfStatus::Checkpoint, "{}", message());
+        assert_eq!(states(&restored)[0].spp, 0, "a failure changes nothing");
+        ok(nf_session_restore(restored.0, job, bytes.as_ptr(), size));
+        for session in [&whole, &other, &restored] {
             while open(session) > 0 {
                 round(session, 2);
             }
         }
-        assert_eq!(states(&whole), states(&other));
-        assert_eq!(image(&whole), image(&other));
+        for resumed in [&other, &restored] {
+            assert_eq!(states(&whole), states(resumed));
+            assert_eq!(image(&whole), image(resumed));
+        }
         let lost = CString::new(folder.path().join("no/such/folder").to_str().unwrap()).unwrap();
-        assert_eq!(nf_session_save(whole.0, c"wall".as_ptr(), lost.as_ptr()), NfStatus::Io);
+        assert_eq!(nf_session_save(whole.0, job, lost.as_ptr()), NfStatus::Io);
     }
 }
 
@@ -244,61 +261,6 @@ fn shared_pixels_stay_shared_after_a_resume() {
         let shares = resumed.lock().ok().unwrap().pixels() == noisefloor::source::PixelNoise::Shared;
         assert_eq!(shares, saved || resuming);
     }
-}
-
-#[test]
-fn a_checkpoint_in_memory_is_that_of_a_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = CString::new(folder.path().join("session.nfc").to_str().unwrap()).unwrap();
-    let whole = session(&params());
-    round(&whole, 1);
-    let mut size = 0;
-    // SAFETY: living handles, text, and arrays of the sizes given.
-    unsafe {
-        ok(nf_session_save(whole.0, c"wall".as_ptr(), path.as_ptr()));
-        let saved = std::fs::read(folder.path().join("session.nfc")).unwrap();
-        let job = c"wall".as_ptr();
-        ok(nf_session_checkpoint(whole.0, job, null_mut(), 0, &mut size));
-        assert_eq!(size, saved.len());
-        let mut bytes = vec![0; size];
-        let short = nf_session_checkpoint(whole.0, job, bytes.as_mut_ptr(), size - 1, &mut size);
-        assert_eq!(short, NfStatus::Size, "{}", message());
-        ok(nf_session_checkpoint(whole.0, job, bytes.as_mut_ptr(), bytes.len(), &mut size));
-        assert!(bytes == saved);
-        let other = session(&params());
-        let cut = nf_session_restore(other.0, job, bytes.as_ptr(), size - 1);
-        assert_eq!(cut, NfStatus::Checkpoint, "{}", message());
-        assert_eq!(states(&other)[0].spp, 0, "a failure changes nothing");
-        ok(nf_session_restore(other.0, job, bytes.as_ptr(), size));
-        // Without a verdict P is NaN, which is not equal to itself
-        assert_eq!(format!("{:?}", states(&whole)), format!("{:?}", states(&other)));
-        assert_eq!(image(&whole), image(&other));
-    }
-}
-
-#[test]
-fn tone_tables_of_a_session_are_checked() {
-    let table = [0.5_f32; 24];
-    let session = session(&params());
-    let set = |exposure, toe, top, edge| {
-        // SAFETY: a living handle, and an array of the size given.
-        unsafe { nf_session_set_tone_table(session.0, exposure, toe, top, table.as_ptr(), table.len(), edge) }
-    };
-    for (exposure, toe, top, edge, said) in [
-        (1.0, 0.0, 4.0, 2, "0 < toe < top"),
-        (1.0, 0.01, f32::INFINITY, 2, "0 < toe < top"),
-        (1.0, 0.01, 4.0, 1, "2 to 65 entries"),
-        (f32::NAN, 0.01, 4.0, 2, "positive finite"),
-    ] {
-        assert_eq!(set(exposure, toe, top, edge), NfStatus::Argument);
-        assert!(message().contains(said), "{}", message());
-    }
-    assert_eq!(set(1.0, 0.01, 4.0, 3), NfStatus::Size);
-    ok(set(0.5, 0.01, 4.0, 2));
-    // One grey for all: nobody sees noise
-    (0..3).for_each(|_| round(&session, 1));
-    assert!(states(&session).iter().all(|state| state.probability > 0.99), "{:?}", states(&session));
-    assert_eq!(set(1.0, 0.01, 4.0, 2), NfStatus::Argument, "after a verdict it is too late");
 }
 
 /// A `.cube` file and a table make the verdicts that they make in Rust, of sessions and of pairs of pictures.
@@ -372,11 +334,19 @@ fn tone_mappings_of_ones_own_judge_as_in_rust() {
     assert!(status == NfStatus::Argument && none && said.contains("no input of a LUT"), "{said}");
     let (status, none, said) = broken("LUT_1D_SIZE 2\n0 0 0\n255 255 255\n", null());
     assert!(status == NfStatus::Argument && none && said.contains("entry 1 is 255"), "{said}");
-    let table = [255.0f32; 24];
-    let mut tone = null_mut();
-    // SAFETY: a table of the size given, and a variable of this function.
-    let status = unsafe { nf_tone_of_table(0.01, 4.0, table.as_ptr(), table.len(), 2, &mut tone) };
-    assert!(status == NfStatus::Argument && tone.is_null() && message().contains("is 255"), "{}", message());
+    use NfStatus::{Argument, Size};
+    for (toe, top, edge, entry, status, said) in [
+        (0.0, 4.0, 2, 0.5, Argument, "0 < toe < top"),
+        (0.01, f32::INFINITY, 2, 0.5, Argument, "0 < toe < top"),
+        (0.01, 4.0, 1, 0.5, Argument, "2 to 65 entries"),
+        (0.01, 4.0, 3, 0.5, Size, "instead of 81"),
+        (0.01, 4.0, 2, 255.0, Argument, "is 255"),
+    ] {
+        let (table, mut tone) = ([entry; 24], null_mut());
+        // SAFETY: a table of the size given, and a variable of this function.
+        let found = unsafe { nf_tone_of_table(toe, top, table.as_ptr(), table.len(), edge, &mut tone) };
+        assert!(found == status && tone.is_null() && message().contains(said), "{}", message());
+    }
 }
 
 /// What `judge` notices of two pictures, a search is told, too.
@@ -443,12 +413,11 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_resume(null(), c"".as_ptr(), c"".as_ptr()),
             nf_session_checkpoint(null(), c"".as_ptr(), null_mut(), 0, &mut n),
             nf_session_restore(null(), c"".as_ptr(), null(), 0),
-            nf_session_set_tone_table(null(), 1.0, 0.01, 4.0, null(), 24, 2),
             nf_tone_of_cube(null(), 9, null(), &mut null_mut()),
             nf_tone_of_table(0.01, 4.0, null(), 24, 2, &mut null_mut()),
             nf_tone_of_cube(c"".as_ptr(), 0, null(), null_mut()),
         ];
-        assert_eq!(without_session, [NullPointer; 20]);
+        assert_eq!(without_session, [NullPointer; 19]);
         ok(nf_tone_free(null_mut()));
         let without_place = [
             nf_session_tile(s, 0, null_mut()),
@@ -467,9 +436,8 @@ fn every_pointer_may_be_null_and_none_is_followed_then() {
             nf_session_resume(s, c"x".as_ptr(), null()),
             nf_session_checkpoint(s, c"x".as_ptr(), null_mut(), 0, null_mut()),
             nf_session_restore(s, c"x".as_ptr(), null(), 9),
-            nf_session_set_tone_table(s, 1.0, 0.01, 4.0, null(), 24, 2),
         ];
-        assert_eq!(without_place, [NullPointer; 17]);
+        assert_eq!(without_place, [NullPointer; 16]);
         let odd = mean.as_ptr().cast::<u8>().add(1).cast();
         assert_eq!(nf_session_push(s, 0, 1, odd, mean.len()), NullPointer);
         assert_eq!(message(), "mean is not aligned");
@@ -745,12 +713,15 @@ fn messages_belong_to_their_thread() {
 }
 
 /// The settings that a search of C asks for are those of Rust's, told the same: of a renderer that gets nowhere near what may be
-/// seen, since its samples do not help, since nobody knows why, or since its pixels have the most.
+/// seen, since its samples do not help, since nobody knows why, or since its pixels have the most; and of one that gets there.
 #[test]
 fn what_is_known_of_one_picture_is_told() {
-    for (alone, floor, ends) in
-        [(1.5, 0.0, NF_SEARCH_NOT_FALLING), (0.0, 0.0, NF_SEARCH_NOT_FALLING), (1.5, 1.2, NF_SEARCH_CAPPED)]
-    {
+    for (alone, floor, falling, ends) in [
+        (1.5, 0.0, false, NF_SEARCH_NOT_FALLING),
+        (0.0, 0.0, false, NF_SEARCH_NOT_FALLING),
+        (1.5, 1.2, false, NF_SEARCH_CAPPED),
+        (0.0, 0.0, true, NF_SEARCH_FOUND),
+    ] {
         let mut rust = Search::new(Knob::Threshold { coarsest: 0.2, finest: 0.0001 }).unwrap();
         let (mut search, mut step) = (null_mut(), NfSearchStep::default());
         // SAFETY: living handles.
@@ -761,74 +732,60 @@ fn what_is_known_of_one_picture_is_told() {
                 let Some(Look { each, setting, .. }) = rust.next() else { break };
                 assert_eq!((step.ending, step.each, step.setting), (NF_SEARCH_SEARCHING, each, setting));
                 let pictures = each.to_bits();
-                let told = NfExcess { ratio: 1.5, alone, floor, pictures, ..NfExcess::default() };
+                let ratio = if falling { 70.0 * each } else { 1.5 };
+                let told = NfExcess { ratio, alone, floor, pictures, ..NfExcess::default() };
+                for wrong in [f64::NAN, -1.0] {
+                    assert_eq!(nf_search_tell(search, NfExcess { ratio: wrong, ..told }), NfStatus::Argument);
+                    assert_eq!(nf_search_tell(search, NfExcess { alone: wrong, ..told }), NfStatus::Argument);
+                }
                 ok(nf_search_tell(search, told));
-                let told = Excess::new(1.5).of_pictures(pictures).with_floor(floor);
+                assert_eq!(nf_search_tell(search, told), NfStatus::Argument, "once");
+                let told = Excess::new(ratio).of_pictures(pictures).with_floor(floor);
                 rust.tell(told.with_alone((alone > 0.0).then_some(alone)), &[]);
             }
-            ok(nf_search_free(search));
+            assert_eq!(nf_search_tell(search, NfExcess::default()), NfStatus::Argument);
+            assert_eq!((nf_search_free(search), nf_search_free(search)), (NfStatus::Ok, NfStatus::Handle));
         }
         assert_eq!(step.ending, ends, "{:?}", rust.ending());
     }
 }
 
-/// A renderer whose noise is in proportion to its threshold, and a denoiser that removes nine tenths of it.
+/// As they were rendered, and behind a denoiser that removes nine tenths of the noise.
 #[test]
-fn a_threshold_is_found() {
-    let (width, height) = (96_u32, 64_u32);
-    let floats = (3 * width * height) as usize;
-    let render = |sigma: f64, seed: u64| -> Vec<f32> {
-        let mut noise = noisefloor_testkit::Noise::new(seed);
-        (0..floats).map(|_| (0.4 + sigma * noise.normal()) as f32).collect()
-    };
+fn pictures_are_compared() {
+    let (width, height) = (WIDTH as u32, HEIGHT as u32);
+    let whole = Tile { index: 0, x: 0, y: 0, width: WIDTH, height: HEIGHT };
+    let pictures = [0, 1].map(|first| render(whole, first, 16));
+    let blurred =
+        [0, 1].map(|i: usize| pictures[i].iter().map(|v| 0.5 + 0.1 * (v - 0.5)).collect::<Vec<_>>());
+    let ([a, b], [da, db]) =
+        ([0, 1].map(|i: usize| pictures[i].as_ptr()), [0, 1].map(|i: usize| blurred[i].as_ptr()));
+    let floats = 3 * PIXELS;
     let by_srgb = NfParams { tone_mapping: NF_TONE_SRGB, ..params() };
-    let oracle = bundled();
-    let (mut search, mut step) = (null_mut(), NfSearchStep::default());
+    let (oracle, mut search, mut excess) = (bundled(), null_mut(), NfExcess::default());
     // SAFETY: living handles, and arrays of the size given.
     unsafe {
         assert_eq!(nf_search_of_threshold(0.1, 0.2, &mut search), NfStatus::Argument);
         assert_eq!(nf_search_of_samples(1, 2, &mut search), NfStatus::Argument);
-        ok(nf_search_of_threshold(0.03, 0.0001, &mut search));
-        let mut last = NfExcess::default();
-        loop {
-            ok(nf_search_next(search, &mut step));
-            if step.ending != NF_SEARCH_SEARCHING {
-                break;
-            }
-            let (a, b) = (render(step.each, 1), render(step.each, 2));
-            let (a, b) = (a.as_ptr(), b.as_ptr());
-            ok(nf_excess(oracle, &by_srgb, width, height, a, b, floats, &mut last));
-            assert!(last.x < width && last.y < height && last.pictures != 0);
-            for wrong in [f64::NAN, -1.0] {
-                assert_eq!(nf_search_tell(search, NfExcess { ratio: wrong, ..last }), NfStatus::Argument);
-                assert_eq!(nf_search_tell(search, NfExcess { alone: wrong, ..last }), NfStatus::Argument);
-            }
-            ok(nf_search_tell(search, last));
-            // Once
-            assert_eq!(nf_search_tell(search, last), NfStatus::Argument);
-        }
-        // One of both is enough
-        let of_each = last.ratio * 2f64.sqrt();
-        assert!(step.ending == NF_SEARCH_FOUND && of_each <= 1.0 && of_each > 0.6, "{step:?} {last:?}");
-        assert_eq!(nf_search_tell(search, last), NfStatus::Argument);
-        assert_eq!((nf_search_free(search), nf_search_free(search)), (NfStatus::Ok, NfStatus::Handle));
-
-        let (a, b) = (render(0.1, 1), render(0.1, 2));
-        let blur = |picture: &[f32]| picture.iter().map(|v| 0.4 + 0.1 * (v - 0.4)).collect::<Vec<f32>>();
-        let (da, db) = (blur(&a), blur(&b));
+        ok(nf_excess(oracle, &by_srgb, width, height, a, b, floats, &mut excess));
+        assert!(excess.x < width && excess.y < height && excess.pictures != 0 && excess.ratio > 0.0);
         let denoised = |lost: f64, excess: &mut NfExcess| {
-            let (a, b, da, db) = (a.as_ptr(), b.as_ptr(), da.as_ptr(), db.as_ptr());
             nf_excess_denoised(lost, &by_srgb, width, height, a, b, da, db, floats, excess)
         };
         let mut other = NfExcess::default();
-        assert_eq!((denoised(0.3, &mut last), denoised(0.6, &mut other)), (NfStatus::Ok, NfStatus::Ok));
-        assert!((last.ratio / other.ratio - 2.0).abs() < 1e-9 && last.ratio > 0.0, "{last:?} {other:?}");
+        assert_eq!((denoised(0.3, &mut excess), denoised(0.6, &mut other)), (NfStatus::Ok, NfStatus::Ok));
+        assert!(
+            (excess.ratio / other.ratio - 2.0).abs() < 1e-9 && excess.ratio > 0.0,
+            "{excess:?} {other:?}"
+        );
         assert_eq!(denoised(f64::NAN, &mut other), NfStatus::Argument);
-        let (a, b) = (a.as_ptr(), null());
         let same = nf_excess(oracle, null(), width, height, a, a, floats, &mut other);
         assert_eq!(same, NfStatus::Argument);
         assert!(message().contains("identical"), "{}", message());
-        assert_eq!(nf_excess(oracle, null(), width, height, a, b, floats, &mut other), NfStatus::NullPointer);
+        assert_eq!(
+            nf_excess(oracle, null(), width, height, a, null(), floats, &mut other),
+            NfStatus::NullPointer
+        );
         assert_eq!(nf_excess(oracle, null(), 0, height, a, a, floats, &mut other), NfStatus::Size);
         assert_eq!(nf_excess(oracle, null(), width, height, a, a, floats - 3, &mut other), NfStatus::Size);
         ok(nf_oracle_free(oracle));

@@ -44,8 +44,12 @@ pub unsafe extern "C" fn nf_tone_of_cube(
     })
 }
 
-/// A table: see nf_session_set_tone_table. The caller frees it with nf_tone_free, parameters and sessions keep what they
-/// need.
+/// A table of display values over radiance, such as a filmic curve, with edge entries along each axis, 2 to 65, red
+/// fastest: floats = 3 * edge^3 display values (sRGB-encoded red, green and blue, 0 to 1). Radiance x, times
+/// exposure, lies at s(1 + x / toe) / s(1 + top / toe) of an axis, where s(2^n * (1 + f)) = n + f is log2
+/// made linear between powers of two: 0 is the first entry and top, or more, the last. Between entries
+/// values are interpolated linearly. NF_STATUS_ARGUMENT if the values are no display values, such as those of 8 bits. The
+/// caller frees it with nf_tone_free, parameters and sessions keep what they need.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn nf_tone_of_table(
     toe: f32,
@@ -56,8 +60,17 @@ pub unsafe extern "C" fn nf_tone_of_table(
     tone: *mut *mut NfTone,
 ) -> NfStatus {
     guard(|| {
+        let make = || {
+            let wrong = |error: ToneTableError| Failure::new(NfStatus::Argument, error.to_string());
+            // Before the table, whose length follows from its edge
+            ToneCurve::table_radiances(edge, toe, top).map_err(wrong)?;
+            // SAFETY: promised by the caller.
+            let values = unsafe { border::array(table, floats, 3 * edge.pow(3), "table") }?;
+            let curve = ToneCurve::of_table(edge, toe, top, values.as_chunks().0.to_vec());
+            Ok(NfTone(curve.map_err(wrong)?))
+        };
         // SAFETY: promised by the caller.
-        unsafe { handle::give(tone, || Ok(NfTone(curve((toe, top), table, floats, edge)?))) }
+        unsafe { handle::give(tone, make) }
     })
 }
 
@@ -65,22 +78,4 @@ pub unsafe extern "C" fn nf_tone_of_table(
 #[unsafe(no_mangle)]
 pub extern "C" fn nf_tone_free(tone: *mut NfTone) -> NfStatus {
     guard(|| handle::free(tone))
-}
-
-/// A curve of a table.
-///
-/// # Safety
-/// As [`border::array`].
-pub(crate) unsafe fn curve(
-    (toe, top): (f32, f32),
-    table: *const f32,
-    floats: usize,
-    edge: usize,
-) -> Result<ToneCurve, Failure> {
-    let wrong = |error: ToneTableError| Failure::new(NfStatus::Argument, error.to_string());
-    // Before the table, whose length follows from its edge
-    ToneCurve::table_radiances(edge, toe, top).map_err(wrong)?;
-    // SAFETY: as for this function.
-    let values = unsafe { border::array(table, floats, 3 * edge.pow(3), "table") }?;
-    ToneCurve::of_table(edge, toe, top, values.as_chunks().0.to_vec()).map_err(wrong)
 }
