@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic in a test is how a test fails")]
 
 mod accuracy; // the table that ships, the model made of it, and how close it is to people
+mod bindings; // what Python and JavaScript replay
 mod contract; // what every source promises, and that broken promises are noticed
 mod descriptor; // a descriptor of one's own, by the recipe
 mod end_to_end; // driver, oracle and renderer together

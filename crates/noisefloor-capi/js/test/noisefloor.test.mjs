@@ -33,15 +33,66 @@ function batch(pixels, spp, random, level = 0.5) {
 
 const options = { tile: 32, maxSpp: 400 };
 
-function render(session, random = noise(7)) {
-  while (!session.isDone) {
-    for (const { tile, spp } of session.requests()) {
-      session.push(batch(tile.width * tile.height, spp, random), { spp, tile });
-    }
-    session.judge();
-  }
-  return session.states();
+/** Those of tests/tests/it/bindings.rs, to the bit. */
+function samples({ width, light, noise, holes }, tile, spp, batch) {
+  const number = (place) => {
+    const mixed = (Math.imul(place, 0x9e3779b1) + Math.imul(batch, 0x85ebca77)) >>> 0;
+    const more = Math.imul(mixed ^ (mixed >>> 15), 0x2c1b3c6d);
+    return (more ^ (more >>> 12)) >>> 8;
+  };
+  return Float32Array.from({ length: 3 * tile.width * tile.height }, (_, place) => {
+    const pixel = Math.floor(place / 3);
+    const [x, y] = [tile.x + (pixel % tile.width), tile.y + Math.floor(pixel / tile.width)];
+    const lit = light * (0.2 + x / width) * ((x + 2 * y) % 50 < 20 ? 0.3 : 1);
+    const hole = holes && number(3 * pixel) % 499 === 0;
+    const random = number(place) / 2 ** 23 - 1;
+    return hole ? NaN : Math.max(lit * (1 + (noise * random) / Math.sqrt(spp)), 0);
+  });
 }
+
+/** Logarithms come from another library than in Rust, so P may differ by 10⁻⁵; no stop of these hangs on so little. */
+test("sessions are those of Rust, also if they are resumed", () => {
+  const file = new URL("../../../../fixtures/sessions.json", import.meta.url);
+  for (const [number, kept] of JSON.parse(readFileSync(file, "utf8")).entries()) {
+    const { width, height, people, running, rounds, params } = kept;
+    const { tile, schedule, step, consecutive, viewing, exposure } = params;
+    const [slope, offset] = params.audience;
+    const toneMapping = params.tone_mapping && { curve: "linear", exposure };
+    const limits = { minSpp: params.min_spp, maxSpp: params.max_spp, consecutive, people };
+    const shown = { viewing, toneMapping, audience: { slope, offset }, onWarning() {} };
+    const begin = () => new Session(width, height, { tile, schedule, step, ...limits, ...shown });
+    let [session, batch] = [begin(), 0];
+    const sums = session.tiles.map((tile) => [0, new Float64Array(3 * tile.width * tile.height)]);
+    for (const states of rounds) {
+      for (const { tile, spp } of session.requests()) {
+        const [mean, sum] = [samples(kept, tile, spp, batch++), sums[tile.index]];
+        sum[0] += spp;
+        mean.forEach((x, i) => (sum[1][i] += x * spp));
+        if (running) session.pushRunning(Float32Array.from(sum[1], (x) => x / sum[0]), { spp: sum[0], tile });
+        else session.push(mean, { spp, tile });
+      }
+      session.judge();
+      for (const { tile, spp, reason, probability } of session.states()) {
+        const [keptSpp, keptReason, p] = states[tile.index];
+        const where = `session ${number}, tile ${tile.index}`;
+        assert.deepEqual([spp, reason], [keptSpp, keptReason === "max-spp" ? "maxSpp" : keptReason], where);
+        assert.equal(probability === null, p === null, where);
+        assert.ok(Math.abs(probability - p) < 1e-5, `${where}: P is ${probability} instead of ${p}`);
+      }
+      if (number % 2) {
+        const checkpoint = session.checkpoint("wall");
+        session.close();
+        session = begin();
+        assert.throws(() => session.resume("hall", checkpoint), { code: "CHECKPOINT", message: /its job is wall/ });
+        assert.throws(() => session.resume("wall", checkpoint.slice(0, -9)), { code: "CHECKPOINT" });
+        session.resume("wall", checkpoint);
+      }
+    }
+    assert.deepEqual([session.isDone, session.nextSpp], [true, Infinity]);
+    assert.equal(session.warnings().length, kept.warnings);
+    session.close();
+  }
+});
 
 test("options that there are not are errors", () => {
   for (const [wrong, name] of [
@@ -77,8 +128,6 @@ test("a picture is rendered until all tiles are done", () => {
     session.stops(),
     stops.sort((a, b) => a.tile.index - b.tile.index),
   );
-  assert.ok(stops.every(({ reason }) => ["converged", "maxSpp"].includes(reason)));
-  assert.equal(session.nextSpp, Infinity);
   const [image, map] = [session.image(), session.visibleNoise()];
   assert.deepEqual([image.length, map.length], [3 * 96 * 80, 96 * 80]);
   assert.ok(Math.abs(image.reduce((sum, x) => sum + x) / image.length - 0.5) < 1e-3);
@@ -146,89 +195,8 @@ test("pixels may lie in any way", () => {
   const { width: w, height: h } = session.tiles[3];
   const tile = Float32Array.from({ length: 4 * w * h }, (_, i) => Math.floor(i / 4 / w));
   session.push(tile, { spp: 50, tile: 3, fromBottom: true });
-  assert.deepEqual(
-    [
-      ...session
-        .image()
-        .slice(3 * (32 * width + 32))
-        .slice(0, 3),
-    ],
-    Array(3).fill(h - 1),
-  );
+  assert.equal(session.image()[3 * (32 * width + 32)], h - 1);
   session.close();
-});
-
-test("running means are what single batches are", () => {
-  const [single, running] = [new Session(64, 32, options), new Session(64, 32, options)];
-  const random = noise(5);
-  const sum = new Float64Array(3 * 64 * 32);
-  for (let total = 50; total <= 400 && !single.isDone; total += 50) {
-    const mean = batch(64 * 32, 50, random);
-    mean.forEach((x, i) => (sum[i] += 50 * x));
-    single.push(mean, { spp: 50 });
-    running.pushRunning(
-      Float32Array.from(sum, (x) => x / total),
-      { spp: total },
-    );
-    single.judge();
-    running.judge();
-  }
-  const states = [single, running].map((session) => session.states());
-  states[0].forEach((state, i) => {
-    assert.ok(state.probability !== null);
-    assert.ok(Math.abs(state.probability - states[1][i].probability) < 1e-3);
-    assert.equal(state.spp, states[1][i].spp);
-  });
-  single.close();
-  running.close();
-});
-
-/**
- * As three-gpu-pathtracer blends samples on the GPU: mean += (sample - mean) / n, rounded to single
- * precision.
- */
-test("a mean that was blended sample by sample is as good as batches", () => {
-  const pixels = 64 * 64;
-  const light = Float32Array.from({ length: 3 * pixels }, (_, i) => 0.05 + ((i / 3) % 64) / 80);
-  const [batches, blended] = [0, 1].map(() => new Session(64, 64, { tile: 32, maxSpp: 3000 }));
-  const [mean, sum] = [new Float32Array(3 * pixels), new Float64Array(3 * pixels)];
-  const random = noise(11);
-  let [spp, pushed, largest] = [0, 0, 0];
-  while (!batches.isDone) {
-    spp++;
-    for (let i = 0; i < mean.length; i++) {
-      // One sample in four finds the light
-      const u = random();
-      const sample = u > 0.5 ? Math.fround(8 * light[i] * (u - 0.5)) : 0;
-      sum[i] += sample;
-      mean[i] =
-        Math.fround(mean[i] * Math.fround(1 - 1 / spp)) + Math.fround(sample * Math.fround(1 / spp));
-    }
-    if (spp < batches.nextSpp) continue;
-    batches.push(
-      sum.map((x) => x / (spp - pushed)),
-      { spp: spp - pushed },
-    );
-    blended.pushRunning(mean, { spp });
-    sum.fill(0);
-    pushed = spp;
-    batches.judge();
-    blended.judge();
-    const states = blended.states();
-    for (const { tile, probability, reason } of batches.states()) {
-      assert.equal(states[tile.index].reason, reason);
-      if (probability === null) continue;
-      largest = Math.max(largest, Math.abs(probability - states[tile.index].probability));
-    }
-  }
-  const stops = batches.stops().map((stop) => stop.spp);
-  console.log(`stops after ${stops} samples; P differs by ${largest.toExponential(1)}`);
-  assert.ok(batches.stops().every(({ reason }) => reason === "converged") && Math.min(...stops) > 300);
-  // Rounding of the mean is 2^-24 of it, and of a batch in it at most n / batch times that: nothing beside
-  // noise
-  assert.ok(largest < 1e-3);
-  batches.close();
-  blended.close();
 });
 
 test("what is likely wrong is a warning", () => {
@@ -293,44 +261,8 @@ test("errors have the words of Rust", () => {
   assert.throws(() => session.push(floats, { spp: 1, stride: 1 }), says("SIZE", /stride of 1/));
   assert.throws(() => session.push(floats, { spp: 1, tile: 2 }), says("BATCH", /tile 2 does not exist/));
   assert.throws(() => session.visibleNoise(), says("UNAVAILABLE", /./));
-  // The running mean instead of new samples
-  const sum = new Float64Array(floats.length);
-  const random = noise(1);
-  assert.throws(
-    () => {
-      for (let n = 1; n <= 20; n++) {
-        batch(64 * 32, 10, random).forEach((x, i) => (sum[i] += x));
-        session.push(
-          Float32Array.from(sum, (x) => x / n),
-          { spp: 10 },
-        );
-        session.judge();
-      }
-    },
-    says("FAULT", /./),
-  );
+  assert.throws(() => session.push(floats.fill(NaN), { spp: 10 }), says("FAULT", /not finite/));
   session.close();
-});
-
-test("a session is resumed to the bit", () => {
-  const whole = render(new Session(96, 80, options));
-  const first = new Session(96, 80, options);
-  const random = noise(7);
-  for (const { tile, spp } of first.requests()) {
-    first.push(batch(tile.width * tile.height, spp, random), { spp, tile });
-  }
-  first.judge();
-  const checkpoint = first.checkpoint("wall");
-  first.close();
-  const second = new Session(96, 80, options);
-  assert.throws(() => second.resume("hall", checkpoint), {
-    code: "CHECKPOINT",
-    message: /its job is wall/,
-  });
-  assert.throws(() => second.resume("wall", checkpoint.slice(0, -9)), { code: "CHECKPOINT" });
-  second.resume("wall", checkpoint);
-  assert.deepEqual(render(second, random), whole);
-  second.close();
 });
 
 test("memory is freed by closing and after forgetting", async () => {
