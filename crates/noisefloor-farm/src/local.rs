@@ -71,8 +71,8 @@ fn start(
     })
 }
 
-#[cfg(test)]
 #[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::plan::Task;

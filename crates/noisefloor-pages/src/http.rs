@@ -9,9 +9,6 @@ mod reply;
 
 pub use body::{read_bytes, read_json};
 pub use exposure::Exposure;
-pub use guard::{Client, Guard, check, security_headers};
+pub use guard::{Client, Guard};
 pub use listen::{Listening, interrupted};
-pub use reply::{
-    ASK, HTML, LOOK, PICTURE, PageFile, Refusal, SCRIPT, SHEET, STYLE, VIEWING, absent, nothing_here,
-    page_file, wrong_method,
-};
+pub use reply::{ASK, HTML, LOOK, PICTURE, PageFile, Refusal, SCRIPT, SHEET, STYLE, VIEWING, absent, pages};

@@ -10,6 +10,12 @@ pub fn seeded(seed: u64) -> fastrand::Rng {
     fastrand::Rng::with_seed(z ^ (z >> 31))
 }
 
+/// A logistic number of mean 0.
+pub fn logistic(random: &mut fastrand::Rng, scale: f64) -> f64 {
+    let u = random.f64().clamp(1e-12, 1.0 - 1e-12);
+    scale * (u / (1.0 - u)).ln()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,12 +3,11 @@
 //! Whoever renders [publishes](LiveRender::publish) states and pictures; a [`WatchServer`] hands out the latest ones.
 
 use crate::error::PagesError;
-use crate::http::{self, Exposure, Guard, HTML, LOOK, Listening, PageFile, SCRIPT, STYLE, absent, page_file};
+use crate::http::{Exposure, LOOK, Listening, PageFile, SCRIPT, STYLE, absent, pages};
 use axum::Router;
 use axum::body::Bytes;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
-use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde::Serialize;
@@ -145,28 +144,12 @@ impl WatchServer {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let listening = runtime.block_on(Listening::bind(address, exposure))?;
         let bound = listening.address();
-        let router = router(live, Arc::new(Guard::new(bound, exposure)));
+        let routes = Router::new().route("/api/state", get(state)).route("/api/picture.png", get(picture));
+        let router = pages("", PAGE, &FILES).merge(routes).with_state(live);
         let serve = move || runtime.block_on(listening.serve(router, std::future::pending()));
         thread::Builder::new().name("watch".into()).spawn(serve).map_err(failed)?;
         Ok(bound)
     }
-}
-
-fn router(live: Arc<LiveRender>, guard: Arc<Guard>) -> Router {
-    Router::new()
-        .route("/", get(|| async { ([(CONTENT_TYPE, HTML)], PAGE) }))
-        .route("/{file}", get(file))
-        .route("/api/state", get(state))
-        .route("/api/picture.png", get(picture))
-        .fallback(http::nothing_here)
-        .method_not_allowed_fallback(http::wrong_method)
-        .layer(from_fn_with_state(guard, http::check))
-        .layer(from_fn(http::security_headers))
-        .with_state(live)
-}
-
-async fn file(Path(name): Path<String>) -> Response {
-    page_file(&FILES, &name)
 }
 
 async fn state(State(live): State<Arc<LiveRender>>) -> Response {

@@ -22,10 +22,6 @@ pub(crate) const COLOURS: [RGBColor; 8] = [
     RGBColor(120, 120, 120),
 ];
 
-pub(crate) fn failed(error: impl std::fmt::Display) -> LabError {
-    LabError::Plot(error.to_string())
-}
-
 /// The colour of series number `i`.
 pub(crate) fn colour(i: usize) -> RGBColor {
     COLOURS[i % COLOURS.len()]
@@ -38,9 +34,9 @@ pub(crate) fn svg(
 ) -> Result<String, LabError> {
     let mut text = String::new();
     let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-    root.fill(&WHITE).map_err(failed)?;
+    root.fill(&WHITE)?;
     draw(&root)?;
-    root.present().map_err(failed)?;
+    root.present()?;
     drop(root);
     Ok(text)
 }

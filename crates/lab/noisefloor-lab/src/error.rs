@@ -8,6 +8,7 @@ use noisefloor_denoise::DenoiseError;
 use noisefloor_image::{PictureError, WriteError};
 use noisefloor_learn::{CorpusError, SvmTrainError, TableError};
 use noisefloor_rivals::MetricError;
+use plotters::drawing::DrawingAreaErrorKind;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -75,4 +76,10 @@ pub enum LabError {
     /// A result that was written reads back as another one.
     #[error("{}: has been changed since it was written; run again", path.display())]
     Changed { path: PathBuf },
+}
+
+impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for LabError {
+    fn from(error: DrawingAreaErrorKind<E>) -> Self {
+        Self::Plot(error.to_string())
+    }
 }

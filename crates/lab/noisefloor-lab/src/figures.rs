@@ -1,7 +1,7 @@
 //! Pictures of an evaluation: thresholds of people and of the model over each scene, one against the other,
 //! and the reliability curve.
 
-use crate::drawing::{colour, failed, sign, svg};
+use crate::drawing::{colour, sign, svg};
 use crate::error::LabError;
 use crate::files::{make_folder, write_text};
 use noisefloor::{Rgb, Tile, display::Display};
@@ -153,8 +153,7 @@ fn thresholds(root: &DrawingArea<SVGBackend<'_>, Shift>, predictions: &[Predicti
         .margin(12)
         .x_label_area_size(44)
         .y_label_area_size(64)
-        .build_cartesian_2d((low..high).log_scale(), (low..high).log_scale())
-        .map_err(failed)?;
+        .build_cartesian_2d((low..high).log_scale(), (low..high).log_scale())?;
     chart
         .configure_mesh()
         .x_desc("people, samples per pixel")
@@ -164,14 +163,13 @@ fn thresholds(root: &DrawingArea<SVGBackend<'_>, Shift>, predictions: &[Predicti
         .label_style(LETTERS)
         .axis_desc_style(LETTERS)
         .light_line_style(WHITE)
-        .draw()
-        .map_err(failed)?;
+        .draw()?;
     for (line, grey) in [
         ([(low, low), (high, high)], 60),
         ([(low, 2.0 * low), (0.5 * high, high)], 170),
         ([(2.0 * low, low), (high, 0.5 * high)], 170),
     ] {
-        chart.draw_series(LineSeries::new(line, RGBColor(grey, grey, grey))).map_err(failed)?;
+        chart.draw_series(LineSeries::new(line, RGBColor(grey, grey, grey)))?;
     }
     let mut scenes: Vec<&str> = predictions.iter().map(|p| p.scene.as_str()).collect();
     scenes.dedup();
@@ -179,7 +177,7 @@ fn thresholds(root: &DrawingArea<SVGBackend<'_>, Shift>, predictions: &[Predicti
         let of_scene = predictions.iter().filter(|p| p.scene == *scene);
         let signs = of_scene.map(|p| sign(i, (p.human_spp, p.predicted_spp), 4, colour(i)));
         let legend = move |(x, y)| sign(i, (x + 10, y), 4, colour(i));
-        chart.draw_series(signs).map_err(failed)?.label((*scene).to_owned()).legend(legend);
+        chart.draw_series(signs)?.label((*scene).to_owned()).legend(legend);
     }
     chart
         .configure_series_labels()
@@ -187,8 +185,7 @@ fn thresholds(root: &DrawingArea<SVGBackend<'_>, Shift>, predictions: &[Predicti
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(200, 200, 200))
         .label_font(LETTERS)
-        .draw()
-        .map_err(failed)?;
+        .draw()?;
     Ok(())
 }
 
@@ -197,8 +194,7 @@ fn reliability(root: &DrawingArea<SVGBackend<'_>, Shift>, bins: &[ReliabilityBin
         .margin(12)
         .x_label_area_size(44)
         .y_label_area_size(64)
-        .build_cartesian_2d(0.0..1.0, 0.0..1.0)
-        .map_err(failed)?;
+        .build_cartesian_2d(0.0..1.0, 0.0..1.0)?;
     chart
         .configure_mesh()
         .x_desc("P of the model")
@@ -206,17 +202,16 @@ fn reliability(root: &DrawingArea<SVGBackend<'_>, Shift>, bins: &[ReliabilityBin
         .label_style(LETTERS)
         .axis_desc_style(LETTERS)
         .light_line_style(WHITE)
-        .draw()
-        .map_err(failed)?;
+        .draw()?;
     let diagonal = LineSeries::new([(0.0, 0.0), (1.0, 1.0)], RGBColor(150, 150, 150));
-    chart.draw_series(diagonal).map_err(failed)?;
+    chart.draw_series(diagonal)?;
     let points = || bins.iter().map(|b| (b.predicted, b.observed));
-    chart.draw_series(LineSeries::new(points(), colour(0))).map_err(failed)?;
+    chart.draw_series(LineSeries::new(points(), colour(0)))?;
     let levels: usize = bins.iter().map(|b| b.levels).sum();
     let circle = |b: &ReliabilityBin| {
         let radius = 2.0 + 22.0 * (b.levels as f64 / levels as f64).sqrt();
         Circle::new((b.predicted, b.observed), radius.round() as i32, colour(0).mix(0.5).filled())
     };
-    chart.draw_series(bins.iter().map(circle)).map_err(failed)?;
+    chart.draw_series(bins.iter().map(circle))?;
     Ok(())
 }

@@ -59,22 +59,14 @@ mod tests {
     use super::*;
     use crate::score::score;
     use crate::table::tests::zone;
-    use noisefloor::{ToneMapping, descriptor::Descriptor, evidence::Evidence};
+    use noisefloor::{descriptor::Descriptor, evidence::Evidence};
 
     /// Two scenes that people stop at the same noise: the baseline that knows this finds their thresholds
     /// exactly.
     #[test]
     fn constant_noise_is_right_where_noise_is_all() {
         let zones = vec![zone("A", 0, 100.0, 1.0), zone("B", 0, 400.0, 2.0)];
-        let table = Table {
-            descriptor: Descriptor::default(),
-            evidence: Evidence::Halves,
-            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
-            viewing: noisefloor::Viewing::default(),
-            numbers: Descriptor::default().number_names(),
-            zones,
-            answers: Vec::new(),
-        };
+        let table = Table::new(Descriptor::default(), Evidence::Halves, zones);
         let scores = score(constant_noise_baseline(&table).iter());
         assert!((scores.error_factor - 1.0).abs() < 1e-3, "{scores:?}");
         assert_eq!(scene_median_baseline(&table), vec![]);

@@ -22,7 +22,7 @@ mod zone;
 
 pub use error::CorpusError;
 pub use levels::{Encoding, Inner, JudgedImage, JudgedImages, Patch, zone_levels};
-
+pub use table::ThresholdRow;
 pub use zone::{JudgedZone, ZoneImages};
 
 use noisefloor_image::{batches, running_means};

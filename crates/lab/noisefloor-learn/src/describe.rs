@@ -14,7 +14,7 @@ use crate::stimulus::as_noise;
 use crate::table::{Level, Origin, Table, Zone, first_word};
 use material::{Material, Shown, does_not_fit};
 use noisefloor::{
-    ToneMapping, Viewing,
+    Viewing,
     descriptor::{Described, Descriptor, NoiseMask},
     evidence::{Evidence, TilePlanes},
     internal::ROUNDING_LUMINANCE,
@@ -116,17 +116,7 @@ fn describe(
         }
     }
     on_zone(all, all);
-    let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-    let viewing = corpora.viewing;
-    Ok(Table {
-        descriptor: descriptor.clone(),
-        evidence,
-        tone_mapping,
-        viewing,
-        numbers: descriptor.number_names(),
-        zones,
-        answers: Vec::new(),
-    })
+    Ok(Table { viewing: corpora.viewing, ..Table::new(descriptor.clone(), evidence, zones) })
 }
 
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.

@@ -38,8 +38,8 @@ pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS};
 pub use baselines::{constant_noise_baseline, scene_median_baseline};
 pub use choices::{Choice, VISIBLE_CHOICES, choices};
 pub use corpus::{
-    Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch, ZoneImages,
-    zone_levels,
+    Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch, ThresholdRow,
+    ZoneImages, zone_levels,
 };
 pub use describe::{Corpora, describe_corpora, describe_pairs};
 pub use error::TableError;

@@ -102,6 +102,19 @@ impl Zone {
 }
 
 impl Table {
+    /// Zones of pictures that people saw as files show them, on the default display; no answers.
+    pub fn new(descriptor: Descriptor, evidence: Evidence, zones: Vec<Zone>) -> Self {
+        Self {
+            numbers: descriptor.number_names(),
+            descriptor,
+            evidence,
+            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
+            viewing: Viewing::default(),
+            zones,
+            answers: Vec::new(),
+        }
+    }
+
     /// Takes away numbers of the descriptor, named as in its columns: to see what each is worth. A machine
     /// that is trained on what is left can be scored, but is not a model.
     pub fn without(mut self, names: &[String]) -> Result<Self, String> {
@@ -212,15 +225,7 @@ pub(crate) mod tests {
     fn columns_are_taken_away_by_name() {
         let mut zone = zone("A", 0, 100.0, 1.0);
         zone.levels.iter_mut().for_each(|l| l.descriptor = vec![0.0, 1.0, 2.0, 3.0, 4.0]);
-        let table = Table {
-            descriptor: Descriptor::default(),
-            evidence: Evidence::Halves,
-            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
-            viewing: Viewing::default(),
-            numbers: Descriptor::default().number_names(),
-            zones: vec![zone],
-            answers: Vec::new(),
-        };
+        let table = Table::new(Descriptor::default(), Evidence::Halves, vec![zone]);
         let less = table.clone().without(&["picture_noise".into(), "texture".into()]).unwrap();
         assert!(less.zones[0].levels.iter().all(|l| l.descriptor == [0.0, 2.0, 4.0]));
         assert_eq!(table.without(&["colour".into()]), Err("colour".into()));

@@ -190,15 +190,7 @@ mod tests {
     fn zones_that_are_listed_twice_are_refused_with_their_line() {
         let mut zones = vec![zone("A", 0, 100.0, 1.0), zone("B", 0, 100.0, 1.0), zone("A", 0, 100.0, 1.0)];
         zones.iter_mut().flat_map(|z| &mut z.levels).for_each(|l| l.descriptor = vec![0.0; 5]);
-        let table = Table {
-            descriptor: Descriptor::default(),
-            evidence: Evidence::Halves,
-            tone_mapping: ToneMapping::Srgb { exposure: 1.0 },
-            viewing: Viewing::default(),
-            numbers: Descriptor::default().number_names(),
-            zones,
-            answers: Vec::new(),
-        };
+        let table = Table::new(Descriptor::default(), Evidence::Halves, zones);
         let read = |table: &Table| {
             let mut file = Vec::new();
             write_table(table, &mut file).unwrap();

@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use crate::answer::Answer;
     use crate::table::{Level, Origin, Zone};
-    use noisefloor::{ToneMapping, descriptor::Descriptor, evidence::Evidence};
+    use noisefloor::{descriptor::Descriptor, evidence::Evidence};
 
     /// Scenes where people stop at noise 0.01, whatever else: the first number is ln(noise), the others
     /// distract.
@@ -144,31 +144,18 @@ mod tests {
                 });
             }
         }
-        let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-        Table {
-            descriptor: Descriptor::default(),
-            evidence: Evidence::Halves,
-            tone_mapping,
-            viewing: noisefloor::Viewing::default(),
-            numbers: Descriptor::default().number_names(),
-            zones,
-            answers: Vec::new(),
-        }
+        Table::new(Descriptor::default(), Evidence::Halves, zones)
     }
 
     #[test]
     fn finds_the_rule_that_people_follow_on_scenes_it_has_not_seen() {
         for params in [TrainParams::default(), TrainParams::svm()] {
-            finds_the_rule(&params);
+            let predictions = leave_one_scene_out(&table(4), &params, People::DEFAULT, |_| ()).unwrap();
+            assert_eq!(predictions.len(), 24);
+            let errors = predictions.iter().map(|p| (p.predicted_spp / p.human_spp).ln().abs());
+            let error_factor = (errors.sum::<f64>() / 24.0).exp();
+            assert!(error_factor < 1.2, "{error_factor}");
         }
-    }
-
-    fn finds_the_rule(params: &TrainParams) {
-        let predictions = leave_one_scene_out(&table(4), params, People::DEFAULT, |_| ()).unwrap();
-        assert_eq!(predictions.len(), 24);
-        let errors = predictions.iter().map(|p| (p.predicted_spp / p.human_spp).ln().abs());
-        let error_factor = (errors.sum::<f64>() / 24.0).exp();
-        assert!(error_factor < 1.2, "{error_factor}");
     }
 
     /// The rule is noise 0.01: who still sees noise at half of that, in a picture of a group of its own,
@@ -241,14 +228,11 @@ mod tests {
 
     #[test]
     fn too_few_groups_are_an_error() {
-        assert!(matches!(
-            leave_one_scene_out(&table(2), &TrainParams::default(), People::DEFAULT, |_| ()),
-            Err(TrainError::Groups { .. })
-        ));
-        assert!(matches!(
-            train(&table(1), &TrainParams::default(), String::new(), None),
-            Err(TrainError::Groups { .. })
-        ));
+        let params = TrainParams::default();
+        let left_out = leave_one_scene_out(&table(2), &params, People::DEFAULT, |_| ());
+        assert!(matches!(left_out, Err(TrainError::Groups { .. })));
+        let trained = train(&table(1), &params, String::new(), None);
+        assert!(matches!(trained, Err(TrainError::Groups { .. })));
     }
 
     #[test]

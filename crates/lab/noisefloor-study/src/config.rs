@@ -86,11 +86,10 @@ impl Study {
     /// [`Study::check_pictures`] opens the others.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, StudyError> {
         let path = path.as_ref();
-        let io = |source| StudyError::Io { path: path.to_owned(), source };
         let mut text = String::new();
-        let length =
-            File::open(path).and_then(|f| f.take(MAX_FILE + 1).read_to_string(&mut text)).map_err(io)?;
-        let bad = |what: String| StudyError::File { path: path.to_owned(), what };
+        let length = File::open(path).and_then(|f| f.take(MAX_FILE + 1).read_to_string(&mut text));
+        let length = length.map_err(|fault| StudyError::at(path, fault))?;
+        let bad = |what: String| StudyError::at(path, what);
         if length as u64 > MAX_FILE {
             return Err(bad(format!("longer than {MAX_FILE} bytes")));
         }

@@ -6,39 +6,16 @@ use noisefloor_image::{PictureError, StackError, WriteError};
 use noisefloor_pages::PagesError;
 use noisefloor_pages::http::Refusal;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Why a study cannot be run as its file asks.
 #[derive(Debug, Error)]
 pub enum StudyError {
-    #[error("{}: cannot be read: {source}; check the path and its permissions", path.display())]
-    Io {
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
-    #[error("{}: {what}; docs/studies.md lists what a study file holds", path.display())]
-    File {
-        path: PathBuf,
-        /// What is wrong, with the line number if known.
-        what: String,
-    },
+    #[error("{}: {fault}", path.display())]
+    File { path: PathBuf, fault: FileFault },
     #[error("stack {name}: {levels} pictures named by their samples per pixel; a stack needs 2 to {max}")]
     Levels { name: String, levels: usize, max: usize },
-    #[error(
-        "{}: {got:?} pixels, but the most converged picture of the stack has {want:?}; \
-         render it again at that size",
-        path.display()
-    )]
-    Size {
-        path: PathBuf,
-        /// Its width and height in pixels.
-        got: (usize, usize),
-        want: (usize, usize),
-    },
-    #[error("{}: has pixels that are not finite; fix the render", path.display())]
-    NotFinite { path: PathBuf },
     /// A picture cannot be cut into tiles.
     #[error("stack {name}: {source}")]
     Tile { name: String, source: TileError },
@@ -61,22 +38,55 @@ pub enum StudyError {
     Analysis(String),
 }
 
+/// What is wrong with a file of a study.
+#[derive(Debug, Error)]
+pub enum FileFault {
+    #[error("cannot be read: {0}; check the path and its permissions")]
+    Io(#[from] io::Error),
+    /// With the line number if known.
+    #[error("{0}; docs/studies.md lists what a study file holds")]
+    Content(String),
+    #[error(
+        "{got:?} pixels, but the most converged picture of the stack has {want:?}; \
+         render it again at that size"
+    )]
+    Size {
+        /// Its width and height in pixels.
+        got: (usize, usize),
+        want: (usize, usize),
+    },
+    #[error("has pixels that are not finite; fix the render")]
+    NotFinite,
+}
+
+impl From<String> for FileFault {
+    fn from(what: String) -> Self {
+        Self::Content(what)
+    }
+}
+
+impl StudyError {
+    /// A fault of the file at `path`.
+    pub(crate) fn at(path: &Path, fault: impl Into<FileFault>) -> Self {
+        Self::File { path: path.to_owned(), fault: fault.into() }
+    }
+}
+
 /// Why answers could not be stored or found. Acknowledged answers are never lost.
 #[derive(Debug, Error)]
 pub enum StoreError {
+    /// A fault of the database as a whole.
+    #[error("{}: {fault}", path.display())]
+    File { path: PathBuf, fault: Box<StoreError> },
+    #[error("{0}; check the free space and that the file is a database of `noisefloor-lab study`")]
+    Database(#[from] rusqlite::Error),
     #[error(
-        "{}: {source}; check the free space and that the file is a database of `noisefloor-lab study`",
-        path.display()
+        "holds answers to another study, or to an earlier design of this one; \
+         name another `database` in the study file"
     )]
-    Database { path: PathBuf, source: rusqlite::Error },
-    #[error(
-        "{}: holds answers to another study, or to an earlier design of this one; \
-         name another `database` in the study file",
-        path.display()
-    )]
-    OtherStudy { path: PathBuf },
-    #[error("{}: is not a database of `noisefloor-lab explore`; name another with --database", path.display())]
-    NotDisagreements { path: PathBuf },
+    OtherStudy,
+    #[error("is not a database of `noisefloor-lab explore`; name another with --database")]
+    NotDisagreements,
     #[error("no session has the code {0}; check it, or begin a new session")]
     Unknown(String),
     #[error("no participant was invited by this link; check that it was copied in full")]
@@ -89,6 +99,18 @@ pub enum StoreError {
     Plan { code: String },
     #[error("event {seq} of session {code} does not fit the study: {what}; was the database edited by hand?")]
     Event { code: String, seq: u64, what: String },
+}
+
+impl StoreError {
+    /// Names the database, where the fault is one of it.
+    pub(crate) fn at(self, path: &Path) -> Self {
+        match self {
+            Self::Database(_) | Self::OtherStudy | Self::NotDisagreements => {
+                Self::File { path: path.to_owned(), fault: Box::new(self) }
+            }
+            other => other,
+        }
+    }
 }
 
 impl From<StoreError> for Refusal {

@@ -25,11 +25,10 @@ pub use line::{PersonalLine, fit_line};
 use crate::error::StudyError;
 use app::App;
 use axum::Router;
-use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{delete, get, post, put};
 use gallery::Gallery;
 use noisefloor::text::told_apart;
-use noisefloor_pages::http::{self, Exposure, Guard, Listening};
+use noisefloor_pages::http::{self, Exposure, Listening};
 use std::future::Future;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -67,8 +66,7 @@ impl ExploreServer {
             incoming: tokio::sync::Mutex::default(),
             job: Arc::default(),
         });
-        let guard = Arc::new(Guard::new(listening.address(), exposure));
-        Ok(Self { listening, router: router(app, guard) })
+        Ok(Self { listening, router: router(app) })
     }
 
     pub fn address(&self) -> SocketAddr {
@@ -81,10 +79,8 @@ impl ExploreServer {
     }
 }
 
-fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
-    Router::new()
-        .route("/", get(pages::page))
-        .route("/{file}", get(pages::file))
+fn router(app: Arc<App>) -> Router {
+    http::pages("", pages::PAGE, &pages::FILES)
         .route("/api/texts/{language}", get(pages::texts))
         .route("/api/state", get(api::state))
         .route("/api/arrangement", put(api::arrange))
@@ -99,9 +95,5 @@ fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
         .route("/api/line", post(ask::line))
         .route("/api/retrain", get(ask::progress).post(ask::retrain))
         .route("/api/retrained.nfm", get(ask::retrained))
-        .fallback(http::nothing_here)
-        .method_not_allowed_fallback(http::wrong_method)
-        .layer(from_fn_with_state(guard, http::check))
-        .layer(from_fn(http::security_headers))
         .with_state(app)
 }

@@ -64,7 +64,7 @@ pub use code::parse as parse_code;
 pub use config::{
     AnswerOption, Participants, Question, QuestionKind, Screening, Study, StudyProtocol, Texts,
 };
-pub use error::{StoreError, StudyError};
+pub use error::{FileFault, StoreError, StudyError};
 pub use event::{Choice, Envelope, LoopFrames, StudyEvent, TrialTiming};
 pub use server::{
     Beginning, CompletionView, LanguageView, Overview, OverviewRow, SessionView, StackView, StudyServer,

@@ -17,10 +17,9 @@ use crate::session;
 use crate::store::AnswerStore;
 use app::App;
 use axum::Router;
-use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::Redirect;
 use axum::routing::{get, post};
-use noisefloor_pages::http::{self, Exposure, Guard, Listening};
+use noisefloor_pages::http::{self, Exposure, Listening};
 use std::fmt;
 use std::future::Future;
 use std::net::SocketAddr;
@@ -31,9 +30,7 @@ use tiles::TileCache;
 /// A bound server, ready to run.
 pub struct StudyServer {
     listening: Listening,
-    router: Router,
     base_path: String,
-    key: String,
     app: Arc<App>,
 }
 
@@ -55,19 +52,17 @@ impl StudyServer {
         let store = AnswerStore::open(&study.database, &study.design())?;
         store.keep_plans(Arc::clone(&study)).await?;
         let listening = Listening::bind(address, exposure).await?;
-        let key = code::draw()?;
         let app = Arc::new(App {
             grids: session::grids(&study),
             tiles: TileCache::new(study.clone()),
-            guard: Arc::new(Guard::new(listening.address(), exposure)),
+            guard: listening.guard(),
             live: Mutex::default(),
-            key: key.clone(),
+            key: code::draw()?,
             simulated: AtomicBool::new(false),
             store,
             study,
         });
-        let base_path = exposure.base_path.clone();
-        Ok(Self { listening, router: router(Arc::clone(&app), &base_path), base_path, key, app })
+        Ok(Self { listening, base_path: exposure.base_path.clone(), app })
     }
 
     /// Admits [simulated observers](crate::simulated), who need no link and get no completion code: for a
@@ -84,21 +79,19 @@ impl StudyServer {
 
     /// Path of the experimenter's page with its key, to be put after the address that browsers use.
     pub fn experimenter_path(&self) -> String {
-        format!("{}/experimenter.html#{}", self.base_path, self.key)
+        format!("{}/experimenter.html#{}", self.base_path, self.app.key)
     }
 
     /// Serves until `stop` resolves, and answers the requests that arrived until then.
     pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), StudyError> {
-        self.listening.serve(self.router, stop).await;
+        self.listening.serve(router(self.app, &self.base_path), stop).await;
         Ok(())
     }
 }
 
 fn router(app: Arc<App>, base: &str) -> Router {
     let at = |path: &str| format!("{base}{path}");
-    let mut router = Router::new()
-        .route(&at("/"), get(pages::page))
-        .route(&at("/{file}"), get(pages::file))
+    let mut router = http::pages(base, pages::PAGE, &pages::FILES)
         .route(&at("/api/study"), get(api::study))
         .route(&at("/api/texts/{language}"), get(api::texts))
         .route(&at("/api/overview"), get(overview::overview))
@@ -111,10 +104,5 @@ fn router(app: Arc<App>, base: &str) -> Router {
         let page = at("/");
         router = router.route(base, get(move || async move { Redirect::permanent(&page) }));
     }
-    router
-        .fallback(http::nothing_here)
-        .method_not_allowed_fallback(http::wrong_method)
-        .layer(from_fn_with_state(app.guard.clone(), http::check))
-        .layer(from_fn(http::security_headers))
-        .with_state(app)
+    router.with_state(app)
 }

@@ -1,8 +1,8 @@
 //! A stack of pictures of one view, from noisy to converged, cut into the 8-bit tiles that observers see.
 
-use crate::error::StudyError;
+use crate::error::{FileFault, StudyError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use image::{ExtendedColorType, ImageEncoder, ImageError};
 use noisefloor::{Rgb, Tile, TileGrid, ToneMapping, display::Display};
 use noisefloor_image::{Frame, Picture, read_picture, running_means};
 use rayon::prelude::*;
@@ -66,7 +66,7 @@ impl StudyStack {
                     "a frame of stack {name} whose levels are not those of {}: all frames have the same",
                     folders[0].display()
                 );
-                return Err(StudyError::File { path: other.clone(), what });
+                return Err(StudyError::at(other, what));
             }
             paths.push(pictures);
         }
@@ -82,7 +82,7 @@ impl StudyStack {
                  the limits are {MAX_PIXELS} pixels and {MAX_TILES} tiles, so use larger tiles or a crop",
                 grid.len()
             );
-            return Err(StudyError::File { path: folder, what });
+            return Err(StudyError::at(&folder, what));
         }
         let display = match &reference {
             Picture::Linear(image) => Some(ToneMapping::default().settle(&image.pixels)),
@@ -167,7 +167,7 @@ impl StudyStack {
         let picture = read_picture(path)?;
         let want = (self.grid.width(), self.grid.height());
         if picture.size() != want {
-            return Err(StudyError::Size { path: path.clone(), got: picture.size(), want });
+            return Err(StudyError::at(path, FileFault::Size { got: picture.size(), want }));
         }
         let byte = |c: f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
         let bytes = |pixels: &mut dyn Iterator<Item = Rgb>| pixels.flatten().map(byte).collect();
@@ -175,14 +175,11 @@ impl StudyStack {
             (Picture::Display(image), None) => Ok(bytes(&mut image.pixels.iter().copied())),
             (Picture::Linear(image), Some(display)) => {
                 if !image.pixels.iter().flatten().all(|c| c.is_finite()) {
-                    return Err(StudyError::NotFinite { path: path.clone() });
+                    return Err(StudyError::at(path, FileFault::NotFinite));
                 }
                 Ok(bytes(&mut image.pixels.iter().map(|&p| display.encode(p))))
             }
-            _ => {
-                let what = "a stack holds either PNGs or EXRs, not both".to_owned();
-                Err(StudyError::File { path: path.clone(), what })
-            }
+            _ => Err(StudyError::at(path, "a stack holds either PNGs or EXRs, not both".to_owned())),
         }
     }
 
@@ -198,14 +195,8 @@ impl StudyStack {
     fn png(&self, level: u32, pixels: &[u8], tile: Tile) -> Result<Vec<u8>, StudyError> {
         let rows = tile.rows(self.grid.width());
         let cut: Vec<u8> = rows.flat_map(|row| &pixels[3 * row.start..3 * row.end]).copied().collect();
-        let mut png = Vec::new();
-        PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub)
-            .write_image(&cut, tile.width as u32, tile.height as u32, ExtendedColorType::Rgb8)
-            .map_err(|e| StudyError::File {
-                path: self.paths[0][level as usize].clone(),
-                what: e.to_string(),
-            })?;
-        Ok(png)
+        let failed = |e: ImageError| StudyError::at(&self.paths[0][level as usize], e.to_string());
+        png((tile.width, tile.height), &cut).map_err(failed)
     }
 
     pub(crate) fn check_pictures(&self) -> Result<(), StudyError> {
@@ -215,6 +206,18 @@ impl StudyStack {
     }
 }
 
+/// A picture of three bytes a pixel as a PNG file.
+pub(crate) fn png((width, height): (usize, usize), rgb: &[u8]) -> Result<Vec<u8>, ImageError> {
+    let mut png = Vec::new();
+    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub).write_image(
+        rgb,
+        width as u32,
+        height as u32,
+        ExtendedColorType::Rgb8,
+    )?;
+    Ok(png)
+}
+
 /// Levels and pictures of one folder.
 fn running(folder: &Path) -> Result<(Vec<u64>, Vec<PathBuf>), StudyError> {
     Ok(running_means(folder)?.into_iter().map(|Frame { last, path, .. }| (last, path)).unzip())
@@ -222,7 +225,7 @@ fn running(folder: &Path) -> Result<(Vec<u64>, Vec<PathBuf>), StudyError> {
 
 /// The folders of the frames of a loop, in the order of their names.
 fn frames_of(folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
-    let io = |source| StudyError::Io { path: folder.to_owned(), source };
+    let io = |fault: std::io::Error| StudyError::at(folder, fault);
     let mut frames = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
@@ -237,14 +240,14 @@ fn frames_of(folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
              each with pictures of all levels",
             frames.len()
         );
-        return Err(StudyError::File { path: folder.to_owned(), what });
+        return Err(StudyError::at(folder, what));
     }
     Ok(frames)
 }
 
 /// Reads the samples at which each tile stopped from a table with the columns `tile` and `spp`.
 fn read_stops(path: &Path, grid: TileGrid) -> Result<Vec<f64>, StudyError> {
-    let bad = |what: String| StudyError::File { path: path.to_owned(), what };
+    let bad = |what: String| StudyError::at(path, what);
     let mut csv = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_path(path)

@@ -28,7 +28,7 @@ pub fn render_stack(
             "a stack needs at least two levels, each with more samples than the one before".into()
         ));
     }
-    std::fs::create_dir_all(folder).map_err(|source| StudyError::Io { path: folder.to_owned(), source })?;
+    std::fs::create_dir_all(folder).map_err(|fault| StudyError::at(folder, fault))?;
     let info = source.info();
     let grid = TileGrid::new(info.width, info.height, EDGE)
         .map_err(|source| StudyError::Tile { name: info.name.clone(), source })?;

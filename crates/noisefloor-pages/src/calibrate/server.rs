@@ -4,8 +4,8 @@ use super::course::{CHOICES, Calibration, CalibrationStage, Factor};
 use super::tiles::{CalibrationTile, EDGE};
 use crate::error::PagesError;
 use crate::http::{
-    self, ASK, Exposure, Guard, HTML, LOOK, Listening, PICTURE, PageFile, Refusal, SCRIPT, SHEET, STYLE,
-    VIEWING, absent, interrupted, page_file, read_json,
+    ASK, Exposure, LOOK, Listening, PICTURE, PageFile, Refusal, SCRIPT, SHEET, STYLE, VIEWING, absent,
+    interrupted, pages, read_json,
 };
 use crate::languages::{parse_language, read_languages};
 use crate::viewing::{Conditions, ViewingLimits, ViewingProblem};
@@ -13,7 +13,6 @@ use axum::body::Body;
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
-use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
@@ -93,7 +92,6 @@ impl App {
 /// A bound server, ready to run.
 pub struct CalibrateServer {
     listening: Listening,
-    router: Router,
     app: Arc<App>,
     runtime: tokio::runtime::Runtime,
 }
@@ -111,9 +109,8 @@ impl CalibrateServer {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
         let runtime = runtime.map_err(failed)?;
         let listening = runtime.block_on(Listening::bind(address, exposure))?;
-        let guard = Arc::new(Guard::new(listening.address(), exposure));
         let app = Arc::new(App { setup, state: Mutex::default(), over: Notify::new() });
-        Ok(Self { router: router(app.clone(), guard), listening, app, runtime })
+        Ok(Self { listening, app, runtime })
     }
 
     pub fn address(&self) -> SocketAddr {
@@ -123,22 +120,17 @@ impl CalibrateServer {
     /// Serves until something was found and kept, or Ctrl-C. Returns where it is kept, or why it is not;
     /// `None` if it was interrupted.
     pub fn run(self) -> Option<Result<String, String>> {
-        let Self { listening, router, app, runtime } = self;
-        let over = app.clone();
-        runtime.block_on(async move {
-            let stop = async move {
-                tokio::select! { () = over.over.notified() => (), () = interrupted() => () }
-            };
-            listening.serve(router, stop).await;
-        });
+        let Self { listening, app, runtime } = self;
+        let stop = async {
+            tokio::select! { () = app.over.notified() => (), () = interrupted() => () }
+        };
+        runtime.block_on(listening.serve(router(app.clone()), stop));
         app.state().kept.take()
     }
 }
 
-fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
-    Router::new()
-        .route("/", get(|| async { ([(CONTENT_TYPE, HTML)], PAGE) }))
-        .route("/{file}", get(file))
+fn router(app: Arc<App>) -> Router {
+    pages("", PAGE, &FILES)
         .route("/api/texts/{language}", get(texts))
         .route("/api/state", get(state))
         .route("/api/conditions", post(conditions))
@@ -146,10 +138,6 @@ fn router(app: Arc<App>, guard: Arc<Guard>) -> Router {
         .route("/api/again", post(again))
         // As the tiles of a study are named: which picture, of which trial; it has one tile
         .route("/api/tiles/{choice}/{trial}/0.png", get(picture))
-        .fallback(http::nothing_here)
-        .method_not_allowed_fallback(http::wrong_method)
-        .layer(from_fn_with_state(guard, http::check))
-        .layer(from_fn(http::security_headers))
         .with_state(app)
 }
 
@@ -157,10 +145,6 @@ type Shared = State<Arc<App>>;
 
 fn stale() -> Refusal {
     Refusal::new(StatusCode::CONFLICT, "that is not what is asked now", "trial", "load the page again")
-}
-
-async fn file(Path(name): Path<String>) -> Response {
-    page_file(&FILES, &name)
 }
 
 async fn texts(Path(code): Path<String>) -> Result<Json<BTreeMap<String, String>>, Refusal> {

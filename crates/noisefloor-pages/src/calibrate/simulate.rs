@@ -2,7 +2,7 @@
 
 use super::course::{CHOICES, Calibration, CalibrationStage, CalibrationTrial};
 use super::tiles::CalibrationTile;
-use crate::random::seeded;
+use crate::random::{logistic, seeded};
 use noisefloor::{Oracle, Viewing};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,11 +41,6 @@ impl SimulatedEyes {
         let sees = random.f64() >= self.slips && now > trial.spp.ln();
         if sees { trial.noisy } else { random.usize(..CHOICES) }
     }
-}
-
-fn logistic(random: &mut fastrand::Rng, scale: f64) -> f64 {
-    let u = random.f64().clamp(1e-12, 1.0 - 1e-12);
-    scale * (u / (1.0 - u)).ln()
 }
 
 #[cfg(test)]

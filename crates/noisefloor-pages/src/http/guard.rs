@@ -30,8 +30,27 @@ pub struct Guard {
     /// Port at which any address of this machine is known, if the server listens on all of them.
     any_address: Option<u16>,
     exposure: Exposure,
-    wrong: Mutex<HashMap<IpAddr, (Instant, HashSet<String>)>>,
-    begun: Mutex<HashMap<IpAddr, (Instant, usize)>>,
+    wrong: Counts<HashSet<String>>,
+    begun: Counts<usize>,
+}
+
+/// What came from each address within [`WINDOW`].
+#[derive(Debug, Default)]
+struct Counts<T>(Mutex<HashMap<IpAddr, (Instant, T)>>);
+
+impl<T: Default> Counts<T> {
+    fn of<R>(&self, client: Client, count: impl FnOnce(&mut T) -> R) -> R {
+        let mut counts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if counts.len() >= MOST_ADDRESSES {
+            counts.retain(|_, (since, _)| since.elapsed() < WINDOW);
+        }
+        let begun = || (Instant::now(), T::default());
+        let entry = counts.entry(client.0).or_insert_with(begun);
+        if entry.0.elapsed() >= WINDOW {
+            *entry = begun();
+        }
+        count(&mut entry.1)
+    }
 }
 
 /// The address a request comes from: of the participant, if a trusted proxy passed it on.
@@ -40,14 +59,19 @@ pub struct Client(IpAddr);
 
 impl Guard {
     /// The guard of a server that listens on an address and is exposed like this.
-    pub fn new(address: SocketAddr, exposure: &Exposure) -> Self {
+    pub(super) fn new(address: SocketAddr, exposure: &Exposure) -> Self {
         Self {
             hosts: exposure.hosts(address),
             any_address: address.ip().is_unspecified().then(|| address.port()),
             exposure: exposure.clone(),
-            wrong: Mutex::default(),
-            begun: Mutex::default(),
+            wrong: Counts::default(),
+            begun: Counts::default(),
         }
+    }
+
+    /// Whether the address is a proxy that is believed.
+    pub(super) fn trusts(&self, peer: IpAddr) -> bool {
+        self.exposure.proxies.contains(&peer)
     }
 
     /// A host, in lower case, if it is this server, with or without a port.
@@ -65,30 +89,25 @@ impl Guard {
 
     /// Where a request comes from, and the scheme of the page: a proxy that is trusted says both.
     fn origin_of(&self, peer: IpAddr, headers: &HeaderMap) -> (IpAddr, &'static str) {
-        if !self.exposure.proxies.contains(&peer) {
+        if !self.trusts(peer) {
             return (peer, "http");
         }
         let text = |name: &str| headers.get_all(name).iter().filter_map(|v| v.to_str().ok());
         // The last address that is no trusted proxy: those before it may be made up
         let hops: Vec<&str> = text("x-forwarded-for").flat_map(|v| v.split(',')).map(str::trim).collect();
         let hops = hops.iter().rev().filter_map(|hop| hop.parse::<IpAddr>().ok());
-        let client = hops.into_iter().find(|hop| !self.exposure.proxies.contains(hop)).unwrap_or(peer);
+        let client = hops.into_iter().find(|hop| !self.trusts(*hop)).unwrap_or(peer);
         let secure = text("x-forwarded-proto").next_back().is_some_and(|v| v.trim() == "https");
         (client, if secure { "https" } else { "http" })
     }
 
     /// Counts a session without a link, which anybody can begin.
     pub fn begins(&self, client: Client) -> Result<(), Refusal> {
-        let mut begun = self.begun.lock().unwrap_or_else(PoisonError::into_inner);
-        if begun.len() >= MOST_ADDRESSES {
-            begun.retain(|_, (since, _)| since.elapsed() < WINDOW);
-        }
-        let (since, count) = begun.entry(client.0).or_insert_with(|| (Instant::now(), 0));
-        if since.elapsed() >= WINDOW {
-            (*since, *count) = (Instant::now(), 0);
-        }
-        *count += 1;
-        if *count <= SESSIONS {
+        let count = |begun: &mut usize| {
+            *begun += 1;
+            *begun
+        };
+        if self.begun.of(client, count) <= SESSIONS {
             return Ok(());
         }
         let what = format!("{SESSIONS} sessions were begun from this address within a minute");
@@ -98,16 +117,14 @@ impl Guard {
     /// Counts a wrong code. After many different ones from an address, its guesses are refused for a
     /// while; requests with a valid code never get here.
     pub fn wrong_code(&self, client: Client, code: &str) -> Refusal {
-        let mut wrong = self.wrong.lock().unwrap_or_else(PoisonError::into_inner);
-        if wrong.len() >= MOST_ADDRESSES {
-            wrong.retain(|_, (since, _)| since.elapsed() < WINDOW);
-        }
-        let (since, codes) = wrong.entry(client.0).or_insert_with(|| (Instant::now(), HashSet::new()));
-        if since.elapsed() >= WINDOW {
-            (*since, *codes) = (Instant::now(), HashSet::new());
-        }
-        if codes.len() < WRONG_CODES {
-            codes.insert(code.chars().take(16).collect());
+        let count = |codes: &mut HashSet<String>| {
+            let fits = codes.len() < WRONG_CODES;
+            fits && {
+                codes.insert(code.chars().take(16).collect());
+                true
+            }
+        };
+        if self.wrong.of(client, count) {
             return Refusal::unknown_code();
         }
         let what = format!("{WRONG_CODES} different wrong codes came from this address within a minute");
@@ -116,7 +133,7 @@ impl Guard {
 }
 
 /// Refuses requests that mean another host, or come from another page.
-pub async fn check(
+pub(super) async fn check(
     State(guard): State<Arc<Guard>>,
     ConnectInfo(peer): ConnectInfo<SocketAddr>,
     mut request: Request,
@@ -177,7 +194,7 @@ fn foreign(guard: &Guard, scheme: &str, request: &Request) -> Option<Refusal> {
 }
 
 /// Headers of every reply.
-pub async fn security_headers(request: Request, next: Next) -> Response {
+pub(super) async fn security_headers(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     for (name, value) in [

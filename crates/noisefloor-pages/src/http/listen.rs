@@ -1,9 +1,12 @@
 //! Connections: how many, for how long, and how they end.
 
 use super::exposure::Exposure;
+use super::guard::{Guard, check, security_headers};
 use super::patience::Patient;
+use super::reply::{nothing_here, wrong_method};
 use crate::error::PagesError;
 use axum::extract::ConnectInfo;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::{Extension, Router};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -43,8 +46,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 pub struct Listening {
     listener: TcpListener,
     address: SocketAddr,
-    /// Proxies stand for many.
-    proxies: Vec<IpAddr>,
+    guard: Arc<Guard>,
     limits: Limits,
 }
 
@@ -55,16 +57,30 @@ impl Listening {
         let failed = |source| PagesError::Listen { address: address.to_string(), source };
         let listener = TcpListener::bind(address).await.map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        Ok(Self { listener, address, proxies: exposure.proxies.clone(), limits: LIMITS })
+        let guard = Arc::new(Guard::new(address, exposure));
+        Ok(Self { listener, address, guard, limits: LIMITS })
+    }
+
+    /// What checks its requests.
+    pub fn guard(&self) -> Arc<Guard> {
+        Arc::clone(&self.guard)
     }
 
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Serves until `stop` resolves. Requests under way then have three seconds to finish; idle and
-    /// half-open connections are closed.
+    /// Serves until `stop` resolves, and checks every request. Requests under way then have three seconds to
+    /// finish; idle and half-open connections are closed.
+    ///
+    /// By hand, over hyper: `axum::serve` has no times and no limits, and hyper none for a peer that never
+    /// reads, or for all connections of an address.
     pub async fn serve(self, router: Router, stop: impl Future<Output = ()> + Send) {
+        let router = router
+            .fallback(nothing_here)
+            .method_not_allowed_fallback(wrong_method)
+            .layer(from_fn_with_state(self.guard(), check))
+            .layer(from_fn(security_headers));
         let Limits { connections, of_address, write_time } = self.limits;
         let (slots, places) = (Arc::new(Semaphore::new(connections)), Places::default());
         let graceful = GracefulShutdown::new();
@@ -80,7 +96,8 @@ impl Listening {
             };
             match (slot, accepted) {
                 (Ok(slot), Ok((stream, peer))) => {
-                    let most = if self.proxies.contains(&peer.ip()) { connections } else { of_address };
+                    // Proxies stand for many
+                    let most = if self.guard.trusts(peer.ip()) { connections } else { of_address };
                     let Some(place) = places.take(peer.ip(), most) else { continue };
                     let connection = connection(stream, peer, write_time, &router, &graceful);
                     tokio::spawn(async move {
@@ -208,7 +225,7 @@ mod tests {
     impl Served {
         fn within(limits: Limits) -> Self {
             let runtime = Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
-            let exposure = Exposure::default();
+            let exposure = Exposure::named(&["x".to_owned()]);
             let listening = Listening::bind((LOCAL, 0).into(), &exposure);
             let listening = Listening { limits, ..runtime.block_on(listening).unwrap() };
             let (address, large) = (listening.address(), Bytes::from(vec![b'.'; LARGE]));
@@ -249,8 +266,8 @@ mod tests {
         let [mut stuck, other] = [0; 2].map(|_| served.ask(LOCAL, "/large"));
         sleep(Duration::from_millis(100));
         assert!(is_answered(served.ask(LOCAL, "/")));
-        // One of the two was dropped; let the time of the other one, which may be this, be over, too. What is left of the reply
-        // never comes
+        // One of the two was dropped; let the time of the other one, which may be this, be over, too. What is
+        // left of the reply never comes
         sleep(2 * write_time);
         let mut got = Vec::new();
         drop(stuck.read_to_end(&mut got));

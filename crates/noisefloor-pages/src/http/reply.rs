@@ -1,10 +1,12 @@
 //! What is answered: files of the pages, and, when a request is refused, JSON that says what, where, and what
 //! to do.
 
-use axum::Json;
+use axum::extract::Path;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use axum::{Json, Router};
 use serde::Serialize;
 
 #[derive(Debug)]
@@ -78,11 +80,21 @@ pub const LOOK: PageFile = ("style.css", STYLE, include_str!("../../pages/style.
 /// How the display is measured.
 pub const VIEWING: PageFile = ("viewing.js", SCRIPT, include_str!("../../pages/viewing.js"));
 
-pub fn page_file(files: &[PageFile], name: &str) -> Response {
-    match files.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
-        None => absent("there is no such page").into_response(),
-    }
+/// Routes to a page at `base`, and to its files.
+pub fn pages<S>(base: &str, page: &'static str, files: &'static [PageFile]) -> Router<S>
+where
+    S: Clone + Send + Sync + 'static,
+{
+    let file = async |name: Option<Path<String>>| {
+        let name = name.map(|Path(name)| name).unwrap_or_default();
+        match files.iter().find(|(known, ..)| *known == name) {
+            Some((_, kind, text)) => ([(CONTENT_TYPE, *kind)], *text).into_response(),
+            None => absent("there is no such page").into_response(),
+        }
+    };
+    Router::new()
+        .route(&format!("{base}/"), get(async move || ([(CONTENT_TYPE, HTML)], page)))
+        .route(&format!("{base}/{{file}}"), get(file))
 }
 
 /// There is nothing at that path.
@@ -90,13 +102,13 @@ pub fn absent(what: &str) -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, what, "path", "go to /")
 }
 
-pub async fn nothing_here(uri: Uri) -> Refusal {
+pub(super) async fn nothing_here(uri: Uri) -> Refusal {
     let path: String = uri.path().chars().take(100).collect();
     Refusal::new(StatusCode::NOT_FOUND, format!("nothing is at {path}"), "path", "go to /")
 }
 
 /// The route has no such method.
-pub async fn wrong_method() -> Refusal {
+pub(super) async fn wrong_method() -> Refusal {
     let do_ = "GET reads, POST adds, DELETE erases a session";
     Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "this is not done with that method", "method", do_)
 }

@@ -4,6 +4,7 @@ use super::outcome::{Comparison, CriterionRun, CurvePoint};
 use super::page::page;
 use super::pictures::Pictures;
 use super::plots::{Cost, Plot};
+use super::quality::Quality;
 use crate::error::LabError;
 use crate::files::{make_folder, write_json, write_text};
 use noisefloor_image::write_csv;
@@ -11,47 +12,22 @@ use serde::Serialize;
 use std::path::Path;
 
 #[derive(Serialize)]
-struct CurveRow<'a> {
+struct CurveHead<'a> {
     scene: &'a str,
     spp: u64,
     source_seconds: f64,
-    rel_mse: f64,
-    psnr: f64,
-    flip: f64,
-    flip_worst: f64,
-    flip_worst_block: f64,
-    flip_bad_block: f64,
-    butteraugli: f64,
-    butteraugli_worst: f64,
-    butteraugli_worst_block: f64,
-    cvvdp_jod: f64,
-    cvvdp_jod_worst: f64,
+}
+
+#[derive(Serialize)]
+struct CurveTail {
     denoised_jod_worst: Option<f64>,
     denoised_seconds: Option<f64>,
 }
 
-impl<'a> CurveRow<'a> {
-    fn new(scene: &'a str, point: &CurvePoint) -> Self {
-        let CurvePoint { spp, source_seconds, quality, denoised_jod_worst, denoised_seconds } = *point;
-        Self {
-            scene,
-            spp,
-            source_seconds,
-            rel_mse: quality.rel_mse,
-            psnr: quality.psnr,
-            flip: quality.flip,
-            flip_worst: quality.flip_worst,
-            flip_worst_block: quality.flip_worst_block,
-            flip_bad_block: quality.flip_bad_block,
-            butteraugli: quality.butteraugli,
-            butteraugli_worst: quality.butteraugli_worst,
-            butteraugli_worst_block: quality.butteraugli_worst_block,
-            cvvdp_jod: quality.cvvdp_jod,
-            cvvdp_jod_worst: quality.cvvdp_jod_worst,
-            denoised_jod_worst,
-            denoised_seconds,
-        }
-    }
+/// A line of curve.csv.
+fn curve_line<'a>(scene: &'a str, point: &CurvePoint) -> (CurveHead<'a>, Quality, CurveTail) {
+    let CurvePoint { spp, source_seconds, quality, denoised_jod_worst, denoised_seconds } = *point;
+    (CurveHead { scene, spp, source_seconds }, quality, CurveTail { denoised_jod_worst, denoised_seconds })
 }
 
 /// Writes what there is of one scene into a folder, which is made: curve.csv, tiles.csv, plots (SVG and
@@ -64,7 +40,7 @@ pub fn write_scene(
 ) -> Result<(), LabError> {
     make_folder(folder)?;
     let scene = &comparison.scene;
-    write_csv(folder.join("curve.csv"), comparison.curve.iter().map(|point| CurveRow::new(scene, point)))?;
+    write_csv(folder.join("curve.csv"), comparison.curve.iter().map(|point| curve_line(scene, point)))?;
     write_csv(folder.join("tiles.csv"), &comparison.tiles)?;
     pictures.reference.save(folder.join("reference.png"))?;
     for (spec, canvas) in &pictures.criteria {

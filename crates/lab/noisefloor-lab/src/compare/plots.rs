@@ -2,7 +2,7 @@
 
 use super::outcome::{Comparison, CriterionRun, CurvePoint, families};
 use super::quality::Quality;
-use crate::drawing::{Pen, colour, failed, sign, svg};
+use crate::drawing::{Pen, colour, sign, svg};
 use crate::error::LabError;
 use noisefloor_image::maps::Canvas;
 use plotters::coord::Shift;
@@ -117,7 +117,7 @@ fn draw<B: DrawingBackend>(
     cost: &str,
     panels: &[Panel],
 ) -> Result<(), LabError> {
-    root.fill(&WHITE).map_err(failed)?;
+    root.fill(&WHITE)?;
     let (plots, legend) = root.split_horizontally(SIZE.0 - LEGEND);
     for (panel, area) in panels.iter().zip(plots.split_evenly((panels.len().div_ceil(2), 2))) {
         draw_panel(&area, cost, panel)?;
@@ -127,13 +127,13 @@ fn draw<B: DrawingBackend>(
     let names = panels.first().map(|p| p.markers.iter().map(|m| m.0.as_str())).into_iter().flatten();
     let style = ("sans-serif", 15).into_font().color(&BLACK);
     let line = |row: usize| 30 + 24 * row as i32;
-    legend.draw(&PathElement::new([(8, line(0)), (32, line(0))], BLACK.stroke_width(2))).map_err(failed)?;
-    legend.draw(&Text::new("uniform", (42, line(0) - 8), style.clone())).map_err(failed)?;
+    legend.draw(&PathElement::new([(8, line(0)), (32, line(0))], BLACK.stroke_width(2)))?;
+    legend.draw(&Text::new("uniform", (42, line(0) - 8), style.clone()))?;
     for (i, name) in names.enumerate() {
-        legend.draw(&sign(i, (20, line(i + 1)), 6, colour(i))).map_err(failed)?;
-        legend.draw(&Text::new(name.to_owned(), (42, line(i + 1) - 8), style.clone())).map_err(failed)?;
+        legend.draw(&sign(i, (20, line(i + 1)), 6, colour(i)))?;
+        legend.draw(&Text::new(name.to_owned(), (42, line(i + 1) - 8), style.clone()))?;
     }
-    root.present().map_err(failed)
+    Ok(root.present()?)
 }
 
 fn draw_panel<B: DrawingBackend>(
@@ -150,8 +150,7 @@ fn draw_panel<B: DrawingBackend>(
         .caption(panel.title, ("sans-serif", 16))
         .x_label_area_size(40)
         .y_label_area_size(62)
-        .build_cartesian_2d(Logarithmic(x0, x1), Logarithmic(y0, y1))
-        .map_err(failed)?;
+        .build_cartesian_2d(Logarithmic(x0, x1), Logarithmic(y0, y1))?;
     chart
         .configure_mesh()
         .x_desc(cost)
@@ -161,22 +160,21 @@ fn draw_panel<B: DrawingBackend>(
         .axis_desc_style(letters)
         .light_line_style(WHITE)
         .bold_line_style(RGBColor(225, 225, 225))
-        .draw()
-        .map_err(failed)?;
+        .draw()?;
     let drawable = |p: &&(f64, f64)| p.0 > 0.0 && p.1 > 0.0 && p.0.is_finite() && p.1.is_finite();
     let curve = panel.curve.iter().filter(drawable).copied();
-    chart.draw_series(LineSeries::new(curve, BLACK.stroke_width(2))).map_err(failed)?;
+    chart.draw_series(LineSeries::new(curve, BLACK.stroke_width(2)))?;
     // The first family comes last, on top.
     for (i, (_, family)) in panel.markers.iter().enumerate().rev() {
         let at = || family.iter().filter(drawable).copied();
         if at().count() > 1 {
-            chart.draw_series(LineSeries::new(at(), colour(i).mix(0.6))).map_err(failed)?;
+            chart.draw_series(LineSeries::new(at(), colour(i).mix(0.6)))?;
         }
         let plotting = chart.plotting_area();
         for point in at() {
             let (x, y) = plotting.map_coordinate(&point);
             let (left, top) = area.get_base_pixel();
-            area.draw(&sign(i, (x - left, y - top), 6, colour(i))).map_err(failed)?;
+            area.draw(&sign(i, (x - left, y - top), 6, colour(i)))?;
         }
     }
     Ok(())

@@ -7,10 +7,7 @@ use super::solver::{Weights, fit_weights};
 use crate::advance::{Advance, Watch};
 use crate::error::LabError;
 use ndarray::Axis;
-use noisefloor::{
-    descriptor::{Descriptor, DescriptorSpec},
-    svm::Svm,
-};
+use noisefloor::descriptor::{Descriptor, DescriptorSpec};
 use noisefloor_learn::{SvmParams, SvmTrainError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -199,7 +196,7 @@ fn train(
     let machine = MachineResult {
         asked: split.asked.clone(),
         examples: split.learn.len(),
-        support_vectors: weights.alpha.iter().filter(|&&a| a != 0.0).count(),
+        support_vectors: weights.support().count(),
         seconds_training,
         synthesised,
         real,
@@ -210,18 +207,12 @@ fn train(
 /// Decision value of a row, from the distances that are there.
 fn decision(row: usize, split: &Split, weights: &Weights, geometry: &Geometry, params: SvmParams) -> f64 {
     let squared = geometry.squared.row(row);
-    let terms = split.learn.iter().zip(&weights.alpha).filter(|(_, alpha)| **alpha != 0.0);
-    terms.map(|(&i, alpha)| alpha * (-params.gamma * squared[i]).exp()).sum::<f64>() - weights.rho
+    let term = |(i, alpha): (usize, f64)| alpha * (-params.gamma * squared[split.learn[i]]).exp();
+    weights.support().map(term).sum::<f64>() - weights.rho
 }
 
 fn ask(split: &Split, weights: &Weights, pairs: &Pairs, geometry: &Geometry, params: SvmParams) -> QueryCost {
-    let kept = || split.learn.iter().zip(&weights.alpha).filter(|(_, alpha)| **alpha != 0.0);
-    let svm = Svm {
-        gamma: params.gamma as f32,
-        rho: weights.rho as f32,
-        coefficients: kept().map(|(_, &alpha)| alpha as f32).collect(),
-        vectors: kept().flat_map(|(&i, _)| pairs.row(i)).collect(),
-    };
+    let svm = weights.machine(params, |i| pairs.row(split.learn[i]));
     let (mut seconds, mut largest_difference) = (Vec::new(), 0.0f64);
     for &row in split.ask.iter().step_by(split.ask.len().div_ceil(QUERIES)) {
         let x = pairs.row(row);

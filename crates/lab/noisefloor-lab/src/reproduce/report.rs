@@ -51,46 +51,20 @@ impl ReproductionReport {
         let learned = self.outcomes.iter().flat_map(|o| &o.machines).map(|m| m.examples).max().unwrap_or(0);
         let mut text = format!("{learned} pairs of {e}×{e} pixels, C = 2, γ = 2.\n\n", e = self.edge);
 
-        let [right, noisy, identical, always] = SHARES;
-        let [real, real_noisy, real_identical, real_always] = SHARES_OF_REAL;
-        let header = [
-            "pairs of",
-            "values",
-            "asked about",
-            right,
-            noisy,
-            identical,
-            always,
-            real,
-            real_noisy,
-            real_identical,
-            real_always,
-            "support vectors",
-        ];
-        text += &table(header, self.outcomes.iter().map(scores).collect());
+        let shares = [SHARES, SHARES_OF_REAL].concat();
+        let header = [&["pairs of", "values", "asked about"], &shares[..], &["support vectors"]].concat();
+        text += &table(&header, self.outcomes.iter().map(scores).collect());
         text += "\n";
 
         let header =
             ["pairs of", "values", "distances, s", "training, s", "query, s", "model, MB", "f32 − f64"];
         let costs = self.outcomes.iter().filter_map(|o| o.query.as_ref().map(|q| cost(o, q)));
-        text += &table(header, costs.collect());
+        text += &table(&header, costs.collect());
         text += "\n";
 
-        let header = [
-            "pairs of",
-            "values",
-            "scene left out",
-            right,
-            noisy,
-            identical,
-            always,
-            real,
-            real_noisy,
-            real_identical,
-            real_always,
-        ];
+        let header = [&["pairs of", "values", "scene left out"], &shares[..]].concat();
         let left_out = self.outcomes.iter().filter(|o| o.of.protocol == PairProtocol::SceneLeftOut);
-        text += &table(header, left_out.flat_map(scenes).collect());
+        text += &table(&header, left_out.flat_map(scenes).collect());
         text += "\n";
         for note in &self.notes {
             text += &format!("- {note}\n");
@@ -128,7 +102,7 @@ fn what(outcome: &ProtocolOutcome) -> [String; 2] {
     [pairs.to_owned(), outcome.of.scaling.name().to_owned()]
 }
 
-fn scores(outcome: &ProtocolOutcome) -> [String; 12] {
+fn scores(outcome: &ProtocolOutcome) -> Vec<String> {
     let asked = match outcome.of.protocol {
         PairProtocol::Learned => "the pairs learned",
         PairProtocol::PairsHeldOut => "a fifth of the pairs, held out",
@@ -143,16 +117,14 @@ fn scores(outcome: &ProtocolOutcome) -> [String; 12] {
         [one] => format!("{} of {}", one.support_vectors, one.examples),
         _ => format!("{:.0}…{:.0} %", vectors(f64::min), vectors(f64::max)),
     };
-    let [pairs, values] = what(outcome);
     let (synthesised, real) = total(outcome);
-    let ([a, b, c, d], [e, f, g, h]) = (shares(synthesised), shares(real));
-    [pairs, values, asked.to_owned(), a, b, c, d, e, f, g, h, vectors]
+    [&what(outcome)[..], &[asked.to_owned()], &shares(synthesised), &shares(real), &[vectors]].concat()
 }
 
-fn cost(outcome: &ProtocolOutcome, query: &QueryCost) -> [String; 7] {
+fn cost(outcome: &ProtocolOutcome, query: &QueryCost) -> Vec<String> {
     let [pairs, values] = what(outcome);
     let training: f64 = outcome.machines.iter().map(|m| m.seconds_training).sum();
-    [
+    vec![
         pairs,
         values,
         format!("{:.0}", outcome.seconds_distances),
@@ -163,28 +135,29 @@ fn cost(outcome: &ProtocolOutcome, query: &QueryCost) -> [String; 7] {
     ]
 }
 
-fn scenes(outcome: &ProtocolOutcome) -> Vec<[String; 11]> {
+fn scenes(outcome: &ProtocolOutcome) -> Vec<Vec<String>> {
     let row = |machine: &MachineResult| {
         let [pairs, values] = what(outcome);
-        let ([a, b, c, d], [e, f, g, h]) = (shares(machine.synthesised), shares(machine.real));
-        [pairs, values, machine.asked.clone(), a, b, c, d, e, f, g, h]
+        [&[pairs, values, machine.asked.clone()][..], &shares(machine.synthesised), &shares(machine.real)]
+            .concat()
     };
     outcome.machines.iter().map(row).collect()
 }
 
 /// A Markdown table that reads well on a terminal, too.
-fn table<const COLUMNS: usize>(header: [&str; COLUMNS], rows: Vec<[String; COLUMNS]>) -> String {
-    let width = |column: usize| {
-        let cells = rows.iter().map(|r| r[column].chars().count());
-        cells.chain([header[column].chars().count()]).max().unwrap_or(0)
+fn table(header: &[&str], rows: Vec<Vec<String>>) -> String {
+    let width = |(column, name): (usize, &&str)| {
+        let cells = rows.iter().map(|row| row[column].chars().count());
+        cells.max().unwrap_or(0).max(name.chars().count())
     };
-    let widths: [usize; COLUMNS] = std::array::from_fn(width);
-    let line = |cells: &[String; COLUMNS]| {
-        let padded = cells.iter().zip(widths).map(|(cell, width)| format!(" {cell:width$} "));
+    let widths: Vec<usize> = header.iter().enumerate().map(width).collect();
+    let line = |cells: Vec<String>| {
+        let padded = cells.iter().zip(&widths).map(|(cell, width)| format!(" {cell:width$} "));
         format!("|{}|\n", padded.collect::<Vec<_>>().join("|"))
     };
-    let rule = widths.map(|width| "-".repeat(width));
-    line(&header.map(str::to_owned)) + &line(&rule) + &rows.iter().map(line).collect::<String>()
+    let rule = widths.iter().map(|&width| "-".repeat(width)).collect();
+    let header = header.iter().map(|&name| name.to_owned()).collect();
+    [header, rule].into_iter().chain(rows).map(line).collect()
 }
 
 #[cfg(test)]
@@ -200,7 +173,7 @@ mod tests {
 
     #[test]
     fn tables_line_up() {
-        let rows = vec![["×1".to_owned(), "long".into()], ["2".into(), "x".into()]];
-        assert_eq!(table(["a", "b"], rows), "| a  | b    |\n| -- | ---- |\n| ×1 | long |\n| 2  | x    |\n");
+        let rows = vec![vec!["×1".to_owned(), "long".into()], vec!["2".into(), "x".into()]];
+        assert_eq!(table(&["a", "b"], rows), "| a  | b    |\n| -- | ---- |\n| ×1 | long |\n| 2  | x    |\n");
     }
 }

@@ -4,7 +4,6 @@
 //! other: neither its kernel trait nor its fitting functions are public. For the paper's descriptor, 9,600
 //! rows of 32,768 numbers, that would take hours a machine.
 
-use super::gram::squared_distances;
 use ndarray::{Array2, ArrayView2};
 use noisefloor::svm::Svm;
 use noisefloor_learn::{SvmParams, SvmTrainError, check_examples};
@@ -49,21 +48,25 @@ pub(super) fn fit_weights(
     Ok(solve(kernel.view(), converged, params.c))
 }
 
-/// A machine that has learned rows, one an example.
-pub(super) fn fit_rows(
-    rows: ArrayView2<'_, f64>,
-    converged: &[bool],
-    params: SvmParams,
-) -> Result<Svm, SvmTrainError> {
-    check_examples(rows, converged, params)?;
-    let Weights { alpha, rho } = fit_weights(squared_distances(rows, |_, _| ()).view(), converged, params)?;
-    let kept = || (0..rows.nrows()).filter(|&i| alpha[i] != 0.0);
-    Ok(Svm {
-        gamma: params.gamma as f32,
-        rho: rho as f32,
-        coefficients: kept().map(|i| alpha[i] as f32).collect(),
-        vectors: kept().flat_map(|i| rows.row(i).to_vec()).map(|v| v as f32).collect(),
-    })
+impl Weights {
+    /// Places of the support vectors among the examples, and their weights.
+    pub(super) fn support(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.alpha.iter().copied().enumerate().filter(|(_, alpha)| *alpha != 0.0)
+    }
+
+    /// The machine; `row` is an example's.
+    pub(super) fn machine<R: IntoIterator<Item = f32>>(
+        &self,
+        params: SvmParams,
+        row: impl Fn(usize) -> R,
+    ) -> Svm {
+        Svm {
+            gamma: params.gamma as f32,
+            rho: self.rho as f32,
+            coefficients: self.support().map(|(_, alpha)| alpha as f32).collect(),
+            vectors: self.support().flat_map(|(i, _)| row(i)).collect(),
+        }
+    }
 }
 
 /// Minimises ½ αᵀQα − Σα, 0 ≤ α ≤ C, Σ yα = 0, Q = yᵢyⱼK, two variables at a time, chosen by second-order
@@ -131,6 +134,7 @@ fn solve(kernel: ArrayView2<'_, f64>, converged: &[bool], c: f64) -> Weights {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reproduce::gram::squared_distances;
     use ndarray::array;
     use noisefloor_learn::fit_svm;
     use noisefloor_testkit::Noise;
@@ -203,31 +207,15 @@ mod tests {
         ] {
             let (rows, labels) = clouds(300, dimensions);
             let params = SvmParams { c, gamma };
-            let ours = fit_rows(rows.view(), &labels, params).unwrap();
+            let squared = squared_distances(rows.view(), |_, _| ());
+            let weights = fit_weights(squared.view(), &labels, params).unwrap();
+            let ours = weights.machine(params, |i| rows.row(i).mapv(|v| v as f32));
             let theirs = fit_svm(rows.view(), &labels, params).unwrap();
             assert_eq!(ours.vectors, theirs.vectors, "{params:?}");
             let pairs = ours.coefficients.iter().zip(&theirs.coefficients);
             let worst = pairs.map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max);
             let rho = f64::from((ours.rho - theirs.rho).abs());
             assert!(worst < 1e-6 * c && rho < 1e-6 * c.max(1.0), "{params:?}: {worst}, {rho}");
-        }
-    }
-
-    /// What a matrix product saves:
-    /// `cargo test --release -p noisefloor-lab long_rows -- --ignored --nocapture`.
-    #[test]
-    #[ignore = "measures time"]
-    fn long_rows() {
-        let (rows, labels) = clouds(600, 32_768);
-        let rows = rows.mapv(|v| v / (32_768f64).sqrt());
-        for (name, fit) in [("linfa", fit_svm as fn(_, &[bool], _) -> _), ("here", fit_rows)] {
-            let begun = std::time::Instant::now();
-            let svm: Svm = fit(rows.view(), &labels, SvmParams::PAPER).unwrap();
-            println!(
-                "{name}: {:.2} s, {} support vectors",
-                begun.elapsed().as_secs_f64(),
-                svm.coefficients.len()
-            );
         }
     }
 }

@@ -1,8 +1,9 @@
 //! A few of the pairs, with what our machine says of them, for other programs to train on.
 
+use super::gram::squared_distances;
 use super::job::Reproduction;
 use super::pairs::Pairs;
-use super::solver::fit_rows;
+use super::solver::fit_weights;
 use crate::advance::Watch;
 use crate::error::LabError;
 use crate::files::{make_folder, write_json};
@@ -54,8 +55,10 @@ fn learn(pairs: &Pairs, count: usize) -> Result<PairSubset, LabError> {
     let params = SvmParams::PAPER;
     let learned = rows.slice(s![..count, ..]).mapv(f64::from);
     let begun = Instant::now();
-    let svm = fit_rows(learned.view(), &identical[..count], params)
+    let squared = squared_distances(learned.view(), |_, _| ());
+    let weights = fit_weights(squared.view(), &identical[..count], params)
         .map_err(|source| LabError::Train { machine: "the machine of the subset".into(), source })?;
+    let svm = weights.machine(params, |i| rows.row(i).to_vec());
     let seconds_training = begun.elapsed().as_secs_f64();
     let begun = Instant::now();
     let decisions: Vec<f32> = rows.rows().into_iter().map(|row| svm.decision(&row.to_vec())).collect();

@@ -1,7 +1,7 @@
 //! Mean thresholds, scene by scene.
 
 use super::{RatedRival, scene_means};
-use crate::drawing::{colour, failed, sign, svg};
+use crate::drawing::{colour, sign, svg};
 use crate::error::LabError;
 use noisefloor_learn::Prediction;
 use plotters::coord::Shift;
@@ -47,8 +47,7 @@ fn draw(
         .margin_right(150)
         .x_label_area_size(40)
         .y_label_area_size(64)
-        .build_cartesian_2d(-0.5..scenes.len() as f64 - 0.5, (low / 1.3..high * 1.3).log_scale())
-        .map_err(failed)?;
+        .build_cartesian_2d(-0.5..scenes.len() as f64 - 0.5, (low / 1.3..high * 1.3).log_scale())?;
     let name = |x: &f64| {
         let near = (x - x.round()).abs() < 1e-6 && *x >= 0.0;
         scenes.get(x.round().max(0.0) as usize).filter(|_| near).cloned().unwrap_or_default()
@@ -63,19 +62,18 @@ fn draw(
         .axis_desc_style(letters)
         .light_line_style(WHITE)
         .disable_x_mesh()
-        .draw()
-        .map_err(failed)?;
+        .draw()?;
     for (i, (name, values)) in series.iter().enumerate() {
         // People in black, all others in colours
         let ink = if i == 0 { BLACK } else { colour(i - 1) };
         let offset = (i as f64 - series.len() as f64 / 2.0) * 0.07;
         let known = values.iter().enumerate().filter(|(_, v)| v.is_finite());
         let signs = known.map(|(x, &v)| sign(i, (x as f64 + offset, v), 5, ink));
-        chart.draw_series(signs).map_err(failed)?;
+        chart.draw_series(signs)?;
         // The legend, outside: the library's own lies over the plot
         let at = (LEGEND.0 + 8, LEGEND.1 + 24 * i as i32);
-        root.draw(&sign(i, at, 5, ink)).map_err(failed)?;
-        root.draw(&Text::new((*name).to_owned(), (at.0 + 16, at.1 - 7), letters)).map_err(failed)?;
+        root.draw(&sign(i, at, 5, ink))?;
+        root.draw(&Text::new((*name).to_owned(), (at.0 + 16, at.1 - 7), letters))?;
     }
     Ok(())
 }

@@ -126,7 +126,7 @@ fn malformed_rows_have_a_line() {
     }
 
     std::fs::write(folder.path().join("thresholds.csv"), "scene,zone\nBath,1\n").unwrap();
-    assert!(Corpus::open(folder.path()).unwrap_err().to_string().contains("no column renderer"));
+    assert!(Corpus::open(folder.path()).unwrap_err().to_string().contains("missing field `renderer`"));
     for text in [HEADER.as_bytes(), b"", b"\xff\xfe\n\xff"] {
         std::fs::write(folder.path().join("thresholds.csv"), text).unwrap();
         assert!(matches!(Corpus::open(folder.path()), Err(CorpusError::Row { .. })));

@@ -1,31 +1,18 @@
 //! An analysis as files: tables, a corpus for `train`, plots, and the grid over the picture.
 
 use super::plots;
-use super::report::ClassRow;
-use super::report::StudyReport;
+
+use super::report::{ClassRow, StudyReport};
 use super::spread::PeopleSpread;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::config::Study;
 use crate::error::StudyError;
 use noisefloor_image::{write_atomic, write_csv, write_png};
+use noisefloor_learn::ThresholdRow;
 use serde::Serialize;
 use std::fs::{create_dir_all, read_link, remove_file};
 use std::io::Write;
 use std::path::Path;
-
-#[derive(Serialize)]
-struct CorpusRow {
-    scene: String,
-    renderer: String,
-    zone: usize,
-    x: usize,
-    y: usize,
-    width: usize,
-    height: usize,
-    human_spp: f64,
-    first_spp: u64,
-    last_spp: u64,
-}
 
 #[derive(Serialize)]
 struct TileLine<'a> {
@@ -63,9 +50,9 @@ struct ClassLine {
 }
 
 /// Writes `index.html` with all plots, `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`,
-/// `classes.csv`, plots, `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes. Loops are not part
-/// of that: models are trained on stills, and their thresholds are those of films. What was there is
-/// replaced.
+/// `classes.csv`, plots, `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes.
+/// Loops are not part of that: models are trained on stills, and their thresholds are those of films. What was
+/// there is replaced.
 pub fn write(
     dir: &Path,
     study: &Study,
@@ -182,8 +169,8 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
-fn folder(dir: &Path) -> Result<(), StudyError> {
-    create_dir_all(dir).map_err(|source| StudyError::Io { path: dir.to_owned(), source })
+pub(super) fn folder(dir: &Path) -> Result<(), StudyError> {
+    create_dir_all(dir).map_err(|fault| StudyError::at(dir, fault))
 }
 
 fn svg(path: &Path, text: String) -> Result<(), StudyError> {
@@ -215,7 +202,7 @@ fn tile_line(t: &TileRow) -> TileLine<'_> {
     }
 }
 
-/// `thresholds.csv` as `noisefloor_image::corpus` reads it. Thresholds lie within what was offered: one
+/// `thresholds.csv` as [`noisefloor_learn::Corpus`] reads it. Thresholds lie within what was offered: one
 /// beyond is then taken for a lower bound.
 fn corpus(
     dir: &Path,
@@ -232,9 +219,20 @@ fn corpus(
             CorpusThreshold::Mean => t.mean,
         };
         let (scene, renderer) = (t.stack.clone(), stack.renderer().to_owned());
-        let TileRow { tile: zone, x, y, width, height, .. } = *t;
-        let human_spp = spp.clamp(first_spp.max(1) as f64, last_spp as f64);
-        Some(CorpusRow { scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp })
+        let TileRow { tile, x, y, width, height, .. } = *t;
+        Some(ThresholdRow {
+            scene,
+            renderer,
+            zone: tile as u32,
+            x,
+            y,
+            width,
+            height,
+            human_spp: spp.clamp(first_spp.max(1) as f64, last_spp as f64),
+            first_spp,
+            last_spp,
+            reference_spp: None,
+        })
     };
     Ok(write_csv(dir.join("thresholds.csv"), report.tiles.iter().filter_map(row))?)
 }
@@ -245,7 +243,7 @@ fn pictures(corpus: &Path, study: &Study, number: usize) -> Result<(), StudyErro
     folder(corpus)?;
     let stack = &study.stacks[number];
     let path = corpus.join(stack.name());
-    let io = |source| StudyError::Io { path: path.clone(), source };
+    let io = |fault: std::io::Error| StudyError::at(&path, fault);
     // An earlier link goes first: nothing may be written through it
     if read_link(&path).is_ok() {
         remove_file(&path).map_err(io)?;

@@ -6,11 +6,9 @@ use crate::error::StudyError;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD};
 use noisefloor::TileGrid;
 use noisefloor_image::maps::Canvas;
-use plotters::prelude::{
-    BindKeyPoints, ChartBuilder, Circle, IntoDrawingArea, IntoLogRange, LineSeries, PathElement, RGBColor,
-    SVGBackend, WHITE,
-};
-use plotters::style::Color;
+use plotters::coord::Shift;
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::*;
 use std::ops::Range;
 
 const SIZE: (u32, u32) = (720, 480);
@@ -20,11 +18,26 @@ const BLUE: RGBColor = RGBColor(0, 114, 178);
 const VERMILION: RGBColor = RGBColor(213, 94, 0);
 const POINTS: usize = 120;
 
-fn failed(error: impl std::fmt::Display) -> StudyError {
-    StudyError::Analysis(format!("a plot cannot be drawn: {error}"))
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+fn svg(draw: impl FnOnce(&Area<'_>) -> Result<(), StudyError>) -> Result<String, StudyError> {
+    let mut text = String::new();
+    let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    draw(&root)?;
+    root.present()?;
+    drop(root);
+    Ok(text)
 }
 
-/// Labels of a logarithmic axis, none of which touch: 1, 2, 3 and 5 times a power of ten, or all digits where little is covered.
+impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for StudyError {
+    fn from(error: DrawingAreaErrorKind<E>) -> Self {
+        Self::Analysis(format!("a plot cannot be drawn: {error}"))
+    }
+}
+
+/// Labels of a logarithmic axis, none of which touch: 1, 2, 3 and 5 times a power of ten, or all digits where
+/// little is covered.
 fn ticks(covered: &Range<f64>) -> Vec<f64> {
     let is_plain = |digit: &i32| covered.end < 6.0 * covered.start || [1, 2, 3, 5].contains(digit);
     let digits = (1..10).filter(is_plain).map(f64::from);
@@ -42,16 +55,12 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
     let (low, high) = all.fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v.max(0.1)), h.max(v)));
     let shown = low / 1.2..high * 1.2;
     let labels = ticks(&shown);
-    let mut text = String::new();
-    {
-        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
-        root.fill(&WHITE).map_err(failed)?;
-        let mut chart = ChartBuilder::on(&root)
+    svg(|root| {
+        let mut chart = ChartBuilder::on(root)
             .margin(12)
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d(-0.5..tiles.len() as f64 - 0.5, shown.log_scale().with_key_points(labels))
-            .map_err(failed)?;
+            .build_cartesian_2d(-0.5..tiles.len() as f64 - 0.5, shown.log_scale().with_key_points(labels))?;
         chart
             .configure_mesh()
             .disable_x_mesh()
@@ -67,8 +76,7 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
             .light_line_style(WHITE)
-            .draw()
-            .map_err(failed)?;
+            .draw()?;
         for (i, tile) in tiles.iter().enumerate() {
             for (shift, value, interval, colour) in [
                 (-0.12, tile.mean, tile.mean_interval, BLUE),
@@ -77,30 +85,25 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
                 let x = i as f64 + shift;
                 if let Some([low, high]) = interval {
                     let line = PathElement::new([(x, low), (x, high)], colour.stroke_width(2));
-                    chart.draw_series([line]).map_err(failed)?;
+                    chart.draw_series([line])?;
                 }
-                chart.draw_series([Circle::new((x, value), 4, colour.filled())]).map_err(failed)?;
+                chart.draw_series([Circle::new((x, value), 4, colour.filled())])?;
             }
         }
-        root.present().map_err(failed)?;
-    }
-    Ok(text)
+        Ok(())
+    })
 }
 
 /// Psychometric function of each tile of a stack.
 pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, StudyError> {
     let (low, high) = (levels[0].max(1) as f64, levels[levels.len() - 1] as f64);
-    let mut text = String::new();
-    {
-        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
-        root.fill(&WHITE).map_err(failed)?;
-        let mut chart = ChartBuilder::on(&root)
+    svg(|root| {
+        let mut chart = ChartBuilder::on(root)
             .margin(12)
             .margin_right(32) // half of the last label
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d((low..high).log_scale().with_key_points(ticks(&(low..high))), 0.0..1.0)
-            .map_err(failed)?;
+            .build_cartesian_2d((low..high).log_scale().with_key_points(ticks(&(low..high))), 0.0..1.0)?;
         chart
             .configure_mesh()
             .x_desc("samples per pixel (lines: the likeliest curve of a tile; dots: 95 %, over all that fit)")
@@ -109,34 +112,28 @@ pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, Study
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
             .light_line_style(WHITE)
-            .draw()
-            .map_err(failed)?;
+            .draw()?;
         for tile in tiles {
             let at = |i: usize| low * (high / low).powf(i as f64 / (POINTS - 1) as f64);
             let curve = (0..POINTS).map(|i| (at(i), tile.fit.share(at(i))));
-            chart.draw_series(LineSeries::new(curve, BLUE.mix(0.6))).map_err(failed)?;
+            chart.draw_series(LineSeries::new(curve, BLUE.mix(0.6)))?;
             if tile.level95 < high {
                 let dot = Circle::new((tile.level95, 0.95), 3, VERMILION.filled());
-                chart.draw_series([dot]).map_err(failed)?;
+                chart.draw_series([dot])?;
             }
         }
-        root.present().map_err(failed)?;
-    }
-    Ok(text)
+        Ok(())
+    })
 }
 
 /// The paper's Table 2 as points with Wilson's intervals.
 pub(super) fn classes(rows: &[ClassRow]) -> Result<String, StudyError> {
-    let mut text = String::new();
-    {
-        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
-        root.fill(&WHITE).map_err(failed)?;
-        let mut chart = ChartBuilder::on(&root)
+    svg(|root| {
+        let mut chart = ChartBuilder::on(root)
             .margin(12)
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d(-0.5..rows.len() as f64 - 0.5, 0.0..1.0)
-            .map_err(failed)?;
+            .build_cartesian_2d(-0.5..rows.len() as f64 - 0.5, 0.0..1.0)?;
         let name = |x: &f64| {
             let row = (x.round() - x).abs() < 1e-6;
             let row = row.then(|| rows.get(x.round() as usize)).flatten();
@@ -151,18 +148,16 @@ pub(super) fn classes(rows: &[ClassRow]) -> Result<String, StudyError> {
             .label_style(LETTERS)
             .axis_desc_style(LETTERS)
             .light_line_style(WHITE)
-            .draw()
-            .map_err(failed)?;
+            .draw()?;
         for (i, row) in rows.iter().enumerate() {
             let [low, high] = row.identical.wilson;
             let line = PathElement::new([(i as f64, low), (i as f64, high)], INK.stroke_width(2));
-            chart.draw_series([line]).map_err(failed)?;
+            chart.draw_series([line])?;
             let dot = Circle::new((i as f64, row.identical.share), 5, BLUE.filled());
-            chart.draw_series([dot]).map_err(failed)?;
+            chart.draw_series([dot])?;
         }
-        root.present().map_err(failed)?;
-    }
-    Ok(text)
+        Ok(())
+    })
 }
 
 /// The picture, three bytes a pixel, with the tile grid and a threshold in each tile (Takouachet et al. 2017,

@@ -4,8 +4,8 @@
 //! Participants are numbered in the order they began. Their codes, with which answers can be erased, and the
 //! identifiers from their addresses are left out.
 
-use super::report::ObserverRow;
-use super::report::StudyReport;
+use super::files::folder;
+use super::report::{ObserverRow, StudyReport};
 use crate::config::Study;
 use crate::error::{StoreError, StudyError};
 use crate::event::{Choice, StudyEvent};
@@ -15,7 +15,6 @@ use noisefloor_image::write_atomic;
 use noisefloor_pages::viewing::Conditions;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::fs::create_dir_all;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -207,11 +206,7 @@ pub fn write_raw(
     let task = serde_json::to_value(study.protocol).ok().and_then(|v| v.as_str().map(str::to_owned));
     // BIDS allows no hyphens in labels
     let task = task.unwrap_or_default().replace('-', "");
-    let io = |path: &Path| {
-        let path = path.to_owned();
-        move |source| StudyError::Io { path, source }
-    };
-    create_dir_all(dir).map_err(io(dir))?;
+    folder(dir)?;
     table(&dir.join("responses.csv"), b',', &rows)?;
     let columns: serde_json::Map<String, Value> =
         DICTIONARY.iter().map(|(name, text)| ((*name).to_owned(), json!({ "Description": text }))).collect();
@@ -228,9 +223,9 @@ pub fn write_raw(
     for (i, _) in records.iter().enumerate() {
         let name = participant(i);
         let own: Vec<&ResponseRow> = rows.iter().filter(|row| row.participant == name).collect();
-        let folder = dir.join(&name).join("beh");
-        create_dir_all(&folder).map_err(io(&folder))?;
-        table(&folder.join(format!("{name}_task-{task}_beh.tsv")), b'\t', &own)?;
+        let beh = dir.join(&name).join("beh");
+        folder(&beh)?;
+        table(&beh.join(format!("{name}_task-{task}_beh.tsv")), b'\t', &own)?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use noisefloor_learn::Answer;
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 /// `PRAGMA application_id`: "nfex".
 const APPLICATION: i32 = 0x6e66_6578;
@@ -93,18 +93,7 @@ impl Disagreements {
     /// Opens the database, creating it if needed.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, StoreError> {
         let path = path.as_ref().to_owned();
-        let failed = |source| StoreError::Database { path: path.clone(), source };
-        let connection = Connection::open(&path).map_err(failed)?;
-        let tables: i64 = connection
-            .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
-            .map_err(failed)?;
-        if tables > 0 {
-            check(&connection, &path)?;
-        }
-        settle(&connection).map_err(failed)?;
-        connection.pragma_update(None, "application_id", APPLICATION).map_err(failed)?;
-        connection.pragma_update(None, "user_version", VERSION).map_err(failed)?;
-        connection.execute_batch(TABLES).map_err(failed)?;
+        let connection = prepare(&path).map_err(|fault| fault.at(&path))?;
         Ok(Self { path, connection: Mutex::new(connection) })
     }
 
@@ -114,12 +103,8 @@ impl Disagreements {
         let text = |value: serde_json::Result<String>| value.unwrap_or_default();
         let [x, y, width, height] = said.tile;
         let tile = params![said.picture, x, y, width, height];
-        let connection = self.connection();
-        let failed = |source| self.failed(source);
-        let transaction = connection.unchecked_transaction().map_err(failed)?;
         let before = "SELECT sees_noise FROM disagreements \
             WHERE picture = ?1 AND x = ?2 AND y = ?3 AND width = ?4 AND height = ?5";
-        let before = transaction.query_row(before, tile, |row| row.get(0)).optional().map_err(failed)?;
         let insert = "INSERT OR REPLACE INTO disagreements VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, \
             ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)";
         let row = params![
@@ -143,71 +128,78 @@ impl Disagreements {
             text(serde_json::to_string(&said.evidence)),
             text(serde_json::to_string(&said.numbers)),
         ];
-        transaction.execute(insert, row).map_err(failed)?;
-        let id = transaction.last_insert_rowid();
-        transaction.commit().map_err(failed)?;
-        Ok((id, before))
+        self.within(|connection| {
+            let transaction = connection.unchecked_transaction()?;
+            let before = transaction.query_row(before, tile, |row| row.get(0)).optional()?;
+            transaction.execute(insert, row)?;
+            let id = transaction.last_insert_rowid();
+            transaction.commit()?;
+            Ok((id, before))
+        })
     }
 
     /// Sets the scene of all answers about these pictures, whatever it was called when they were given.
     pub(crate) fn name_scene(&self, pictures: &[String], scene: &str) -> Result<(), StoreError> {
-        let connection = self.connection();
-        let failed = |source| self.failed(source);
-        let transaction = connection.unchecked_transaction().map_err(failed)?;
-        for picture in pictures {
-            let update = "UPDATE disagreements SET scene = ?2 WHERE picture = ?1 AND scene <> ?2";
-            transaction.execute(update, [picture.as_str(), scene]).map_err(failed)?;
-        }
-        transaction.commit().map_err(failed)
+        self.within(|connection| {
+            let transaction = connection.unchecked_transaction()?;
+            for picture in pictures {
+                let update = "UPDATE disagreements SET scene = ?2 WHERE picture = ?1 AND scene <> ?2";
+                transaction.execute(update, [picture.as_str(), scene])?;
+            }
+            transaction.commit()
+        })
     }
 
     /// Deletes an answer; returns false if it does not exist.
     pub(crate) fn take_back(&self, id: i64) -> Result<bool, StoreError> {
-        let deleted = self.connection().execute("DELETE FROM disagreements WHERE id = ?1", [id]);
-        deleted.map(|n| n > 0).map_err(|source| self.failed(source))
+        let delete = "DELETE FROM disagreements WHERE id = ?1";
+        self.within(|connection| Ok(connection.execute(delete, [id])? > 0))
     }
 
     /// All answers, oldest first.
     pub fn all(&self) -> Result<Vec<Disagreement>, StoreError> {
-        read(&self.connection(), &self.path)
+        self.within(read)
     }
 
-    fn connection(&self) -> MutexGuard<'_, Connection> {
-        self.connection.lock().unwrap_or_else(PoisonError::into_inner)
+    fn within<T>(&self, work: impl FnOnce(&Connection) -> rusqlite::Result<T>) -> Result<T, StoreError> {
+        let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
+        work(&connection).map_err(|fault| StoreError::from(fault).at(&self.path))
     }
+}
 
-    fn failed(&self, source: rusqlite::Error) -> StoreError {
-        StoreError::Database { path: self.path.clone(), source }
+fn prepare(path: &Path) -> Result<Connection, StoreError> {
+    let connection = Connection::open(path)?;
+    let tables: i64 = connection.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))?;
+    if tables > 0 {
+        check(&connection)?;
     }
+    settle(&connection)?;
+    connection.pragma_update(None, "application_id", APPLICATION)?;
+    connection.pragma_update(None, "user_version", VERSION)?;
+    connection.execute_batch(TABLES)?;
+    Ok(connection)
 }
 
 /// All disagreements of a database, oldest first. The database may be in use.
 pub fn read_answers(path: impl AsRef<Path>) -> Result<Vec<Disagreement>, StoreError> {
-    let path = path.as_ref();
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let opened = Connection::open_with_flags(path, flags);
-    let connection = opened.map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-    check(&connection, path)?;
-    read(&connection, path)
+    let found = || {
+        let connection = Connection::open_with_flags(&path, flags)?;
+        check(&connection)?;
+        Ok(read(&connection)?)
+    };
+    found().map_err(|fault: StoreError| fault.at(path.as_ref()))
 }
 
-fn check(connection: &Connection, path: &Path) -> Result<(), StoreError> {
+fn check(connection: &Connection) -> Result<(), StoreError> {
     let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    let found = (pragma("application_id").map_err(failed)?, pragma("user_version").map_err(failed)?);
-    if found == (APPLICATION, VERSION) {
-        Ok(())
-    } else {
-        Err(StoreError::NotDisagreements { path: path.to_owned() })
-    }
+    let found = (pragma("application_id")?, pragma("user_version")?);
+    if found == (APPLICATION, VERSION) { Ok(()) } else { Err(StoreError::NotDisagreements) }
 }
 
-fn read(connection: &Connection, path: &Path) -> Result<Vec<Disagreement>, StoreError> {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    let query = format!("SELECT {COLUMNS} FROM disagreements ORDER BY id");
-    let mut statement = connection.prepare(&query).map_err(failed)?;
-    let rows = statement.query_map([], row).map_err(failed)?;
-    rows.collect::<rusqlite::Result<_>>().map_err(failed)
+fn read(connection: &Connection) -> rusqlite::Result<Vec<Disagreement>> {
+    let mut statement = connection.prepare(&format!("SELECT {COLUMNS} FROM disagreements ORDER BY id"))?;
+    statement.query_map([], row)?.collect()
 }
 
 fn row(row: &Row<'_>) -> rusqlite::Result<Disagreement> {

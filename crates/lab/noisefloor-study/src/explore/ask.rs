@@ -184,12 +184,12 @@ pub(crate) async fn retrain(State(app): Shared, body: Body) -> Answer {
         *job = Job::Running(LearnStep { done: 0, of: 1, doing: "beginning".into() });
     }
     job::begin(app.job.clone(), table, answers, app.setup.model.clone(), at);
-    Ok((StatusCode::ACCEPTED, Json(app.job().view())).into_response())
+    Ok((StatusCode::ACCEPTED, Json(&*app.job())).into_response())
 }
 
 /// `GET /api/retrain`
 pub(crate) async fn progress(State(app): Shared) -> Response {
-    Json(app.job().view()).into_response()
+    Json(&*app.job()).into_response()
 }
 
 /// `GET /api/retrained.nfm`

@@ -1,6 +1,6 @@
 //! The gallery: several pictures of one view.
 
-use crate::error::StudyError;
+use crate::error::{FileFault, StudyError};
 use noisefloor::{
     TileGrid,
     evidence::Samples,
@@ -65,8 +65,8 @@ pub(crate) struct PictureView {
 }
 
 impl GalleryPicture {
-    /// Reads a PNG, EXR or PFM file, of an EXR the named layer if it has it. An EXR may state its samples per pixel, as those of `noisefloor render`
-    /// do; otherwise its name may: `00100.png`, `kitchen-64spp.exr`.
+    /// Reads a PNG, EXR or PFM file, of an EXR the named layer if it has it. An EXR may state its samples per
+    /// pixel, as those of `noisefloor render` do; otherwise its name may: `00100.png`, `kitchen-64spp.exr`.
     pub fn read(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Self, StudyError> {
         let path = path.as_ref();
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
@@ -80,12 +80,10 @@ impl GalleryPicture {
             None => samples_in(&name),
         };
         let still = picture.into_still(spp.unwrap_or(1.0)).with_origin(facts.origin);
-        still.check().map_err(|_| StudyError::NotFinite { path: path.to_owned() })?;
+        still.check().map_err(|_| StudyError::at(path, FileFault::NotFinite))?;
         let mut hash = blake3::Hasher::new();
-        let mut file =
-            std::fs::File::open(path).map_err(|source| StudyError::Io { path: path.to_owned(), source })?;
-        std::io::copy(&mut file, &mut hash)
-            .map_err(|source| StudyError::Io { path: path.to_owned(), source })?;
+        let hashed = std::fs::File::open(path).and_then(|mut file| std::io::copy(&mut file, &mut hash));
+        hashed.map_err(|fault| StudyError::at(path, fault))?;
         let id = hash.finalize().to_hex()[..32].to_owned();
         Ok(Self { id, name, counted: spp.is_some(), still: Arc::new(still) })
     }

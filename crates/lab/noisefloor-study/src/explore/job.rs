@@ -2,48 +2,39 @@
 
 use super::learn::{LearnStep, Learned, retrain};
 use noisefloor::{Model, People};
-use noisefloor_learn::Answer;
-use noisefloor_learn::Table;
-use noisefloor_learn::TrainParams;
+use noisefloor_learn::{Answer, Table, TrainParams};
 use serde::Serialize;
 use std::sync::{Arc, Mutex, PoisonError};
 
-#[derive(Debug, Default)]
+/// The job, in JSON as the page sees it.
+#[derive(Debug, Default, Serialize)]
+#[serde(tag = "state", rename_all = "kebab-case")]
 pub(crate) enum Job {
     #[default]
     Idle,
     Running(LearnStep),
-    Failed(String),
-    Done(Box<(Model, Learned)>),
+    Failed {
+        what: String,
+    },
+    Done(Box<Retrained>),
 }
 
-/// The job as the page sees it.
 #[derive(Debug, Serialize)]
-#[serde(tag = "state", rename_all = "kebab-case")]
-pub(crate) enum JobView {
-    Idle,
-    Running(LearnStep),
-    Failed { what: String },
-    Done(Box<Learned>),
+pub(crate) struct Retrained {
+    #[serde(skip)]
+    model: Model,
+    #[serde(flatten)]
+    learned: Learned,
 }
 
 impl Job {
-    pub(crate) fn view(&self) -> JobView {
-        match self {
-            Self::Idle => JobView::Idle,
-            Self::Running(step) => JobView::Running(step.clone()),
-            Self::Failed(what) => JobView::Failed { what: what.clone() },
-            Self::Done(done) => JobView::Done(Box::new(done.1.clone())),
-        }
-    }
-
     pub(crate) fn is_running(&self) -> bool {
         matches!(self, Self::Running(_))
     }
 
     pub(crate) fn model(&self) -> Option<&Model> {
         match self {
-            Self::Done(done) => Some(&done.0),
+            Self::Done(done) => Some(&done.model),
             _ => None,
         }
     }
@@ -68,9 +59,9 @@ pub(crate) fn begin(job: Arc<Mutex<Job>>, table: Table, answers: Vec<Answer>, mo
         // A panic in the solver must not leave the page waiting
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
         set(match outcome {
-            Ok(Ok(done)) => Job::Done(Box::new(done)),
-            Ok(Err(error)) => Job::Failed(error.to_string()),
-            Err(_) => Job::Failed("the training met a contradiction and gave up".into()),
+            Ok(Ok((model, learned))) => Job::Done(Box::new(Retrained { model, learned })),
+            Ok(Err(error)) => Job::Failed { what: error.to_string() },
+            Err(_) => Job::Failed { what: "the training met a contradiction and gave up".into() },
         });
     });
 }

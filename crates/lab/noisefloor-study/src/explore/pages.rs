@@ -3,13 +3,12 @@
 use axum::Json;
 use axum::extract::Path;
 use axum::http::StatusCode;
-use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
-use noisefloor_pages::http::{ASK, HTML, LOOK, PageFile, Refusal, SCRIPT, STYLE, page_file};
+use noisefloor_pages::http::{ASK, LOOK, PageFile, Refusal, SCRIPT, STYLE};
 use noisefloor_pages::languages::parse_language;
 
-const PAGE: &str = include_str!("../../pages/explore/index.html");
-const FILES: [PageFile; 10] = [
+pub(super) const PAGE: &str = include_str!("../../pages/explore/index.html");
+pub(super) const FILES: [PageFile; 10] = [
     ASK,
     ("explore.js", SCRIPT, include_str!("../../pages/explore/explore.js")),
     ("grid.js", SCRIPT, include_str!("../../pages/explore/grid.js")),
@@ -21,10 +20,6 @@ const FILES: [PageFile; 10] = [
     LOOK,
     ("explore.css", STYLE, include_str!("../../pages/explore/explore.css")),
 ];
-
-pub(crate) async fn page() -> Response {
-    ([(CONTENT_TYPE, HTML)], PAGE).into_response()
-}
 
 const LANGUAGES: [(&str, &str); 2] = [
     ("en", include_str!("../../pages/explore/languages/en.toml")),
@@ -41,8 +36,4 @@ pub(crate) async fn texts(Path(code): Path<String>) -> Response {
                 .into_response()
         }
     }
-}
-
-pub(crate) async fn file(Path(name): Path<String>) -> Response {
-    page_file(&FILES, &name)
 }

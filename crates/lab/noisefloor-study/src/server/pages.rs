@@ -1,9 +1,6 @@
 //! The pages, embedded in the program.
 
-use axum::extract::Path;
-use axum::http::header::CONTENT_TYPE;
-use axum::response::{IntoResponse, Response};
-use noisefloor_pages::http::{ASK, HTML, LOOK, PICTURE, PageFile, SCRIPT, SHEET, STYLE, VIEWING, page_file};
+use noisefloor_pages::http::{ASK, HTML, LOOK, PICTURE, PageFile, SCRIPT, SHEET, STYLE, VIEWING};
 
 macro_rules! page {
     ($name:literal, $kind:expr) => {
@@ -11,8 +8,8 @@ macro_rules! page {
     };
 }
 
-const PAGE: &str = include_str!("../../pages/index.html");
-const FILES: [PageFile; 12] = [
+pub(super) const PAGE: &str = include_str!("../../pages/index.html");
+pub(super) const FILES: [PageFile; 12] = [
     page!("app.js", SCRIPT),
     ASK,
     page!("experimenter.css", STYLE),
@@ -26,12 +23,3 @@ const FILES: [PageFile; 12] = [
     page!("welcome.js", SCRIPT),
     LOOK,
 ];
-
-pub(crate) async fn page() -> Response {
-    ([(CONTENT_TYPE, HTML)], PAGE).into_response()
-}
-
-pub(crate) async fn file(name: Option<Path<String>>) -> Response {
-    let name = name.map(|Path(name)| name).unwrap_or_default();
-    page_file(&FILES, &name)
-}

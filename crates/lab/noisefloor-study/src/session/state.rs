@@ -60,27 +60,12 @@ pub struct Haste {
     pub hasty: u32,
 }
 
-/// The trial that is being shown.
-#[derive(Clone, Debug)]
-pub(super) enum Shown {
-    /// The level of each tile, and clicks so far.
-    Acquisition {
-        stack: u32,
-        identical: bool,
-        levels: Vec<u32>,
-        clicks: u64,
-    },
-    Validation {
-        stack: u32,
-        pair: Pair,
-        reference_left: bool,
-    },
-    ForcedChoice {
-        stack: u32,
-        tile: u32,
-        level: u32,
-        noise_first: bool,
-    },
+/// What the plan does not say of the trial that is being shown.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shown {
+    /// Acquisition: of each tile; forced choice: of the tile that it asks about.
+    levels: Vec<u32>,
+    clicks: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -98,8 +83,7 @@ pub struct ParticipantSession {
     pub(super) language: Option<String>,
     pub(super) answers: BTreeMap<String, String>,
     pub(super) at: u32,
-    /// `None` after the last trial.
-    pub(super) shown: Option<Shown>,
+    pub(super) shown: Shown,
     pub(super) haste: Haste,
     pub(super) quests: BTreeMap<(u32, u32), QuestPlus>,
     pub(super) outcomes: Vec<TrialOutcome>,
@@ -133,7 +117,7 @@ impl ParticipantSession {
             language: None,
             answers: BTreeMap::new(),
             at: 0,
-            shown: None,
+            shown: Shown::default(),
             haste: Haste::default(),
             quests: BTreeMap::new(),
             outcomes: Vec::new(),
@@ -229,14 +213,16 @@ impl ParticipantSession {
         };
         self.check_time(timing)?;
         let (outcome, passed) = self.outcome(event)?;
-        self.finish_trial(outcome, passed, timing)
+        self.finish_trial(outcome, passed, timing);
+        Ok(())
     }
 
     /// What the answer to the trial that is shown says, and whether it is the expected one, as far as that is
     /// known.
     fn outcome(&self, event: &StudyEvent) -> Result<(TrialOutcome, bool), EventMisfit> {
-        match (&self.shown, event) {
-            (&Some(Shown::Acquisition { stack, identical, ref levels, clicks }), StudyEvent::Done { .. }) => {
+        let Shown { levels, clicks } = &self.shown;
+        match (self.task(), event) {
+            (Some(Task::Acquisition { stack, identical }), StudyEvent::Done { .. }) => {
                 let moved = levels.iter().filter(|level| **level > 0).count() as f64;
                 let share = moved / levels.len() as f64;
                 let [most, least] = CLICKED_SHARES;
@@ -244,9 +230,10 @@ impl ParticipantSession {
                 let same =
                     |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { stack: s, .. } if *s == stack);
                 let repeat = self.outcomes.iter().filter(same).count() as u32;
-                Ok((TrialOutcome::Stops { stack, repeat, levels: levels.clone(), clicks }, passed))
+                let levels = levels.clone();
+                Ok((TrialOutcome::Stops { stack, repeat, levels, clicks: *clicks }, passed))
             }
-            (&Some(Shown::Validation { stack, pair, .. }), StudyEvent::Answer { choice, .. }) => {
+            (Some(Task::Validation { stack, pair, .. }), StudyEvent::Answer { choice, .. }) => {
                 let identical = match choice {
                     Choice::Identical => true,
                     Choice::Different => false,
@@ -258,7 +245,7 @@ impl ParticipantSession {
                 Ok((TrialOutcome::Judged { stack, class, identical }, passed))
             }
             (
-                &Some(Shown::ForcedChoice { stack, tile, level, noise_first }),
+                Some(Task::ForcedChoice { stack, tile, noise_first, .. }),
                 StudyEvent::Answer { choice, .. },
             ) => {
                 let right = match choice {
@@ -266,7 +253,7 @@ impl ParticipantSession {
                     Choice::Second => !noise_first,
                     _ => return misfit("this trial is answered by first or second"),
                 };
-                Ok((TrialOutcome::Chosen { stack, tile, level, right }, right))
+                Ok((TrialOutcome::Chosen { stack, tile, level: levels[0], right }, right))
             }
             _ => misfit("this kind of answer does not belong to the protocol of the study"),
         }
@@ -289,10 +276,11 @@ impl ParticipantSession {
 
     fn step(&mut self, tile: u32, level: u32, ms: f64) -> Result<(), EventMisfit> {
         self.check_time(&TrialTiming { onset: 0, ms, intervals: Vec::new(), frames: None })?;
-        let Some(Shown::Acquisition { stack, levels, clicks, .. }) = &mut self.shown else {
+        let Some(Task::Acquisition { stack, .. }) = self.task() else {
             return misfit("this kind of answer does not belong to the protocol of the study");
         };
-        let last = self.study.stacks[*stack as usize].last();
+        let Shown { levels, clicks } = &mut self.shown;
+        let last = self.study.stacks[stack as usize].last();
         let limit = MAX_ROUNDS * u64::from(last) * levels.len() as u64;
         let Some(now) = levels.get_mut(tile as usize) else {
             return misfit("there is no such tile");
@@ -310,12 +298,7 @@ impl ParticipantSession {
     }
 
     /// Stores the result of a trial and shows the next one.
-    fn finish_trial(
-        &mut self,
-        outcome: TrialOutcome,
-        passed: bool,
-        timing: &TrialTiming,
-    ) -> Result<(), EventMisfit> {
+    fn finish_trial(&mut self, outcome: TrialOutcome, passed: bool, timing: &TrialTiming) {
         let role = self.plan[self.at as usize].role;
         match role {
             TrialRole::Practice => self.practice.passed += u32::from(passed),
@@ -339,7 +322,6 @@ impl ParticipantSession {
             self.stage = Stage::Finished;
         }
         self.begin_trial();
-        Ok(())
     }
 
     /// After a round of practice: the data if all of it was passed, else another round, if there is one.
@@ -363,21 +345,20 @@ impl ParticipantSession {
         self.quests.entry((stack, tile)).or_insert_with(|| QuestPlus::new(grid.clone()))
     }
 
+    fn task(&self) -> Option<Task> {
+        self.plan.get(self.at as usize).map(|planned| planned.task)
+    }
+
     fn begin_trial(&mut self) {
-        let task = self.plan.get(self.at as usize).map(|planned| planned.task);
-        self.shown = task.map(|task| match task {
-            Task::Acquisition { stack, identical } => {
-                let levels = vec![0; self.study.stacks[stack as usize].grid().len()];
-                Shown::Acquisition { stack, identical, levels, clicks: 0 }
+        let levels = match self.task() {
+            Some(Task::Acquisition { stack, .. }) => vec![0; self.study.stacks[stack as usize].grid().len()],
+            Some(Task::ForcedChoice { stack, tile, obvious: false, .. }) => {
+                vec![self.quest(stack, tile).next_level()]
             }
-            Task::Validation { stack, pair, reference_left } => {
-                Shown::Validation { stack, pair, reference_left }
-            }
-            Task::ForcedChoice { stack, tile, noise_first, obvious } => {
-                let level = if obvious { 0 } else { self.quest(stack, tile).next_level() };
-                Shown::ForcedChoice { stack, tile, level, noise_first }
-            }
-        });
+            Some(Task::ForcedChoice { .. }) => vec![0],
+            Some(Task::Validation { .. }) | None => Vec::new(),
+        };
+        self.shown = Shown { levels, clicks: 0 };
     }
 }
 
@@ -470,11 +451,12 @@ impl ParticipantSession {
             return None;
         }
         let (number, practice) = (self.at, self.role()? == TrialRole::Practice);
-        Some(match *self.shown.as_ref()? {
-            Shown::Acquisition { stack, identical, ref levels, .. } => {
+        let levels = &self.shown.levels;
+        Some(match self.task()? {
+            Task::Acquisition { stack, identical } => {
                 Trial::Acquisition { number, practice, stack, levels: levels.clone(), identical }
             }
-            Shown::Validation { stack, pair, reference_left } => {
+            Task::Validation { stack, pair, reference_left } => {
                 let shown = &self.study.stacks[stack as usize];
                 let reference = vec![shown.last(); shown.grid().len()];
                 let other = match pair {
@@ -487,8 +469,8 @@ impl ParticipantSession {
                 let (left, right) = if reference_left { (reference, other) } else { (other, reference) };
                 Trial::Validation { number, practice, stack, left, right }
             }
-            Shown::ForcedChoice { stack, tile, level, noise_first } => {
-                let last = self.study.stacks[stack as usize].last();
+            Task::ForcedChoice { stack, tile, noise_first, .. } => {
+                let (level, last) = (levels[0], self.study.stacks[stack as usize].last());
                 let (first, second) = if noise_first { (level, last) } else { (last, level) };
                 Trial::ForcedChoice { number, practice, stack, tile, first, second }
             }

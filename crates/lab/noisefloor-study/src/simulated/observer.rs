@@ -5,6 +5,7 @@ use crate::event::{Choice, StudyEvent, TrialTiming};
 use crate::server::StackView;
 use crate::session::Trial;
 use crate::stack::StudyStack;
+use noisefloor_pages::random::{logistic, seeded};
 use noisefloor_pages::viewing::{Ambient, Conditions};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::f64::consts::PI;
@@ -93,6 +94,12 @@ pub struct SimulatedObserver {
 }
 
 impl Public {
+    /// Observers who are all the median one, always, and never slip.
+    pub fn of(thresholds: Vec<Vec<f64>>) -> Self {
+        let shape = SpreadShape::Logistic;
+        Self { thresholds, shape, between: 0.0, by_place: 0.0, within: 0.0, lapse: 0.0, bias: 0.0 }
+    }
+
     /// A made-up population for rehearsals: thresholds within a factor of two of each stack's geometric
     /// middle, spreads of 0.3 between and 0.1 within observers, 1 % lapses. It predicts nothing about
     /// people.
@@ -103,12 +110,11 @@ impl Public {
         };
         let of_stack = |s: &StudyStack| (0..s.grid().len()).map(|tile| threshold(s, tile)).collect();
         let thresholds = study.stacks.iter().map(of_stack).collect();
-        let shape = SpreadShape::Logistic;
-        Self { thresholds, shape, between: 0.3, by_place: 0.0, within: 0.1, lapse: 0.01, bias: 0.0 }
+        Self { between: 0.3, within: 0.1, lapse: 0.01, ..Self::of(thresholds) }
     }
 
-    /// The same with a spread of people in one place of this standard deviation of ln(spp). About half of its variance
-    /// is common to all tiles, as it is in what P counts (`noisefloor::oracle::Spread`).
+    /// The same with a spread of people in one place of this standard deviation of ln(spp). About half of its
+    /// variance is common to all tiles, as it is in what P counts (`noisefloor::oracle::Spread`).
     pub fn spread_by(self, deviation: f64) -> Self {
         // A logistic distribution of scale s has the standard deviation s·π/√3
         let scale = deviation * 3f64.sqrt() / PI;
@@ -127,7 +133,7 @@ impl Public {
 
     /// Draws an observer who behaves in this way.
     pub fn draw_as(&self, seed: u64, behaviour: Behaviour) -> SimulatedObserver {
-        let mut random = noisefloor_pages::random::seeded(seed);
+        let mut random = seeded(seed);
         let own = self.between * self.shape.draw(&mut random);
         let (shape, by_place) = (self.shape, self.by_place);
         let mut here = || if by_place > 0.0 { by_place * shape.draw(&mut random) } else { 0.0 };
@@ -153,7 +159,7 @@ impl Public {
     /// `train` gets, and the level where 95 % see no difference. The mean lies above the median: few need much more.
     pub fn levels(&self, stack: usize, tile: usize) -> [f64; 3] {
         let median = self.thresholds[stack][tile];
-        let mut random = noisefloor_pages::random::seeded(0);
+        let mut random = seeded(0);
         let own = (0..400_001).map(|_| self.own(&mut random).exp());
         [median, median * own.sum::<f64>() / 400_001.0, self.quantile(stack, tile, 0.95)]
     }
@@ -166,18 +172,12 @@ impl Public {
 
     /// How far observers and showings lie from the median, in ln(spp), in ascending order.
     fn spread(&self) -> Vec<f64> {
-        let mut random = noisefloor_pages::random::seeded(0);
+        let mut random = seeded(0);
         let mut draw = |_| self.own(&mut random) + logistic(&mut random, self.within);
         let mut sums: Vec<f64> = (0..400_001).map(&mut draw).collect();
         sums.sort_by(f64::total_cmp);
         sums
     }
-}
-
-/// Draws a logistic value with median 0.
-fn logistic(random: &mut fastrand::Rng, scale: f64) -> f64 {
-    let p = random.f64().clamp(1e-12, 1.0 - 1e-12);
-    scale * (p / (1.0 - p)).ln()
 }
 
 impl SimulatedObserver {
@@ -199,19 +199,16 @@ impl SimulatedObserver {
                 let spp = &stacks[*stack as usize].levels;
                 let mut order: Vec<usize> = (0..levels.len()).collect();
                 self.random.shuffle(&mut order);
+                let trial = *number;
                 let mut events = Vec::new();
                 for tile in order {
                     let goal = self.goal(*practice, *identical, *stack as usize, tile, spp);
-                    let steps: Vec<u32> = if goal >= levels[tile] {
-                        (levels[tile] + 1..=goal).collect()
-                    } else {
-                        (goal..levels[tile]).rev().collect()
-                    };
-                    let (trial, tile) = (*number, tile as u32);
+                    let (now, tile) = (levels[tile], tile as u32);
                     let step = |level| StudyEvent::Step { trial, tile, level, at: None, ms: TIMING.ms };
-                    events.extend(steps.into_iter().map(step));
+                    events.extend((now + 1..=goal).map(step));
+                    events.extend((goal..now).rev().map(step));
                 }
-                events.push(StudyEvent::Done { trial: *number, timing: TIMING });
+                events.push(StudyEvent::Done { trial, timing: TIMING });
                 events
             }
             Trial::Validation { number, practice, stack, left, right } => {
@@ -324,24 +321,9 @@ mod tests {
     /// choice they find all noise below it, and guess above.
     #[test]
     fn an_observer_without_spread_is_a_threshold() {
-        let public = Public {
-            thresholds: vec![vec![250.0]],
-            shape: SpreadShape::Logistic,
-            between: 0.0,
-            by_place: 0.0,
-            within: 0.0,
-            lapse: 0.0,
-            bias: 0.0,
-        };
-        let stacks = [StackView {
-            width: 16,
-            height: 16,
-            tile: 16,
-            levels: vec![100, 200, 300, 400],
-            frames: 1,
-            fps: None,
-        }];
-        let mut observer = public.draw(1);
+        let levels = vec![100, 200, 300, 400];
+        let stacks = [StackView { width: 16, height: 16, tile: 16, levels, frames: 1, fps: None }];
+        let mut observer = Public::of(vec![vec![250.0]]).draw(1);
         let trial =
             Trial::Acquisition { number: 7, practice: false, stack: 0, levels: vec![0], identical: false };
         let step = |level| StudyEvent::Step { trial: 7, tile: 0, level, at: None, ms: TIMING.ms };
@@ -368,15 +350,7 @@ mod tests {
     /// The quantile of one logistic spread is known: ln 19 scales above the median at 95 %.
     #[test]
     fn quantiles_are_those_of_the_spread() {
-        let public = Public {
-            thresholds: vec![vec![1000.0]],
-            shape: SpreadShape::Logistic,
-            between: 0.3,
-            by_place: 0.0,
-            within: 0.0,
-            lapse: 0.0,
-            bias: 0.0,
-        };
+        let public = Public { between: 0.3, ..Public::of(vec![vec![1000.0]]) };
         let expected = 1000.0 * (0.3 * 19f64.ln()).exp();
         assert!((public.quantile(0, 0, 0.95) / expected - 1.0).abs() < 0.01);
         assert!((public.quantile(0, 0, 0.5) / 1000.0 - 1.0).abs() < 0.01);

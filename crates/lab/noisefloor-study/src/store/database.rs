@@ -28,41 +28,48 @@ CREATE TABLE IF NOT EXISTS events (
     envelope TEXT NOT NULL, PRIMARY KEY (code, seq)
 ) STRICT, WITHOUT ROWID;";
 
-pub(super) fn open_existing(path: &Path, design: &str) -> Result<Connection, StoreError> {
+/// Whether a missing database is created.
+#[derive(PartialEq)]
+pub(super) enum Mode {
+    Create,
+    Existing,
+}
+
+pub(super) fn open(path: &Path, mode: Mode, design: &str) -> Result<Connection, StoreError> {
     // Without the CREATE flag, a missing file is an error
-    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    let connection = Connection::open_with_flags(path, flags).map_err(failed)?;
-    settle(&connection).map_err(failed)?;
-    check_design(&connection, path, design)?;
-    connection.execute_batch(TABLES).map_err(failed)?;
+    let mut flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    flags.set(OpenFlags::SQLITE_OPEN_CREATE, mode == Mode::Create);
+    let connection = Connection::open_with_flags(path, flags)?;
+    settle(&connection)?;
+    if mode == Mode::Create {
+        claim(&connection, design)?;
+    }
+    let query = "SELECT text FROM design";
+    let kept: Option<String> = connection.query_row(query, [], |row| row.get(0)).optional()?;
+    if kept.as_deref() != Some(design) {
+        return Err(StoreError::OtherStudy);
+    }
+    connection.execute_batch(TABLES)?;
     Ok(connection)
 }
 
-pub(super) fn open(path: &Path, design: &str) -> Result<Connection, StoreError> {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    let connection = Connection::open(path).map_err(failed)?;
-    settle(&connection).map_err(failed)?;
+/// Marks an empty database, or one of an earlier version, as one of this program, for `design`.
+fn claim(connection: &Connection, design: &str) -> Result<(), StoreError> {
     let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
-    let (application, version) =
-        (pragma("application_id").map_err(failed)?, pragma("user_version").map_err(failed)?);
-    let known = application == APPLICATION && (WITHOUT_PLANS..=VERSION).contains(&version);
-    if !known {
-        let tables: i64 = connection
-            .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
-            .map_err(failed)?;
+    let (application, version) = (pragma("application_id")?, pragma("user_version")?);
+    if application != APPLICATION || !(WITHOUT_PLANS..=VERSION).contains(&version) {
+        let tables: i64 = connection.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))?;
         if tables > 0 {
-            return Err(StoreError::OtherStudy { path: path.to_owned() });
+            return Err(StoreError::OtherStudy);
         }
-        connection.pragma_update(None, "application_id", APPLICATION).map_err(failed)?;
+        connection.pragma_update(None, "application_id", APPLICATION)?;
     }
     if version != VERSION {
-        connection.pragma_update(None, "user_version", VERSION).map_err(failed)?;
+        connection.pragma_update(None, "user_version", VERSION)?;
     }
-    connection.execute_batch(TABLES).map_err(failed)?;
-    connection.execute("INSERT OR IGNORE INTO design VALUES (1, ?1)", [design]).map_err(failed)?;
-    check_design(&connection, path, design)?;
-    Ok(connection)
+    connection.execute_batch(TABLES)?;
+    connection.execute("INSERT OR IGNORE INTO design VALUES (1, ?1)", [design])?;
+    Ok(())
 }
 
 /// Connection settings: a log that survives kills, and erased rows overwritten with zeros.
@@ -72,18 +79,6 @@ pub(crate) fn settle(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "synchronous", "FULL")?;
     connection.pragma_update(None, "secure_delete", true)?;
     connection.pragma_update(None, "foreign_keys", true)
-}
-
-pub(super) fn check_design(connection: &Connection, path: &Path, design: &str) -> Result<(), StoreError> {
-    let kept: Option<String> = connection
-        .query_row("SELECT text FROM design", [], |row| row.get(0))
-        .optional()
-        .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-    if kept.as_deref() == Some(design) {
-        Ok(())
-    } else {
-        Err(StoreError::OtherStudy { path: path.to_owned() })
-    }
 }
 
 pub(crate) fn now_ms() -> u64 {

@@ -7,24 +7,18 @@ use crate::error::StoreError;
 use crate::event::Envelope;
 use crate::session::Plan;
 use rusqlite::{Connection, OptionalExtension, Row, params};
-use std::path::Path;
 
 pub(super) fn all_codes(connection: &Connection) -> rusqlite::Result<Vec<String>> {
     let mut query = connection.prepare("SELECT code FROM sessions ORDER BY begun_ms, code")?;
     query.query_map([], |row| row.get(0))?.collect()
 }
 
-pub(super) fn begin(
-    connection: &Connection,
-    path: &Path,
-    session: &NewSession,
-) -> Result<String, StoreError> {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+pub(super) fn begin(connection: &Connection, session: &NewSession) -> Result<String, StoreError> {
     let NewSession { code, seed, plan, group, simulated, ids, link } = session;
     if let Some(token) = link {
         let query = "SELECT code FROM links WHERE token = ?1";
         let found = connection.query_row(query, [token], |row| row.get::<_, Option<String>>(0)).optional();
-        match found.map_err(failed)? {
+        match found? {
             None => return Err(StoreError::NoLink),
             Some(Some(begun)) => return Ok(begun),
             Some(None) => {}
@@ -34,10 +28,10 @@ pub(super) fn begin(
     // SQLite integers are signed; the bit pattern is stored
     let insert = "INSERT INTO sessions VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
     let row = params![code, *seed as i64, group, simulated, now_ms(), ids];
-    connection.execute(insert, row).map_err(failed)?;
-    keep_plan(connection, code, plan).map_err(failed)?;
+    connection.execute(insert, row)?;
+    keep_plan(connection, code, plan)?;
     if let Some(token) = link {
-        connection.execute("UPDATE links SET code = ?2 WHERE token = ?1", [token, code]).map_err(failed)?;
+        connection.execute("UPDATE links SET code = ?2 WHERE token = ?1", [token, code])?;
     }
     Ok(code.clone())
 }
@@ -48,65 +42,42 @@ fn keep_plan(connection: &Connection, code: &str, plan: &Plan) -> rusqlite::Resu
 }
 
 /// Draws and keeps the plans of sessions that have only the seed of theirs.
-pub(super) fn keep_plans(connection: &Connection, path: &Path, study: &Study) -> Result<(), StoreError> {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+pub(super) fn keep_plans(connection: &Connection, study: &Study) -> Result<(), StoreError> {
     let query = "SELECT code, seed FROM sessions WHERE code NOT IN (SELECT code FROM plans)";
-    let mut statement = connection.prepare(query).map_err(failed)?;
-    let without = statement
-        .query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)? as u64)))
-        .and_then(Iterator::collect::<rusqlite::Result<Vec<(String, u64)>>>)
-        .map_err(failed)?;
-    without
-        .iter()
-        .try_for_each(|(code, seed)| keep_plan(connection, code, &Plan::draw(study, *seed)))
-        .map_err(failed)
+    let mut statement = connection.prepare(query)?;
+    let without = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)? as u64)))?;
+    for (code, seed) in without.collect::<rusqlite::Result<Vec<(String, u64)>>>()? {
+        keep_plan(connection, &code, &Plan::draw(study, seed))?;
+    }
+    Ok(())
 }
 
-pub(super) fn append(
-    connection: &Connection,
-    path: &Path,
-    code: &str,
-    envelope: &Envelope,
-) -> Result<(), StoreError> {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+pub(super) fn append(connection: &Connection, code: &str, envelope: &Envelope) -> Result<(), StoreError> {
     let text = serde_json::to_string(envelope).unwrap_or_default();
     let insert = "INSERT OR IGNORE INTO events SELECT code, ?2, ?3, ?4 FROM sessions WHERE code = ?1";
-    let mut statement = connection.prepare_cached(insert).map_err(failed)?;
-    if statement.execute(params![code, envelope.seq, now_ms(), text]).map_err(failed)? == 1 {
+    let mut statement = connection.prepare_cached(insert)?;
+    if statement.execute(params![code, envelope.seq, now_ms(), text])? == 1 {
         return Ok(());
     }
-    if exists(connection, path, code)? {
-        Err(StoreError::Conflict { code: code.to_owned(), seq: envelope.seq })
-    } else {
-        Err(StoreError::Unknown(code.to_owned()))
-    }
+    let session = connection.query_row("SELECT 1 FROM sessions WHERE code = ?1", [code], |_| Ok(()));
+    Err(match session.optional()? {
+        Some(()) => StoreError::Conflict { code: code.to_owned(), seq: envelope.seq },
+        None => StoreError::Unknown(code.to_owned()),
+    })
 }
 
-pub(super) fn exists(connection: &Connection, path: &Path, code: &str) -> Result<bool, StoreError> {
-    let query = "SELECT 1 FROM sessions WHERE code = ?1";
-    let found = connection.query_row(query, [code], |_| Ok(())).optional();
-    found.map(|f| f.is_some()).map_err(|source| StoreError::Database { path: path.to_owned(), source })
-}
-
-pub(super) fn event(
-    connection: &Connection,
-    path: &Path,
-    code: &str,
-    seq: u64,
-) -> Result<Option<Envelope>, StoreError> {
+pub(super) fn event(connection: &Connection, code: &str, seq: u64) -> Result<Option<Envelope>, StoreError> {
     let query = "SELECT envelope FROM events WHERE code = ?1 AND seq = ?2";
-    let found = connection.query_row(query, params![code, seq], |row| row.get::<_, String>(0)).optional();
-    let text = found.map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-    text.map(|text| parse(&text, code, seq)).transpose()
+    let found = connection.query_row(query, params![code, seq], |row| row.get::<_, String>(0)).optional()?;
+    found.map(|text| parse(&text, code, seq)).transpose()
 }
 
-pub(super) fn parse(text: &str, code: &str, seq: u64) -> Result<Envelope, StoreError> {
+fn parse(text: &str, code: &str, seq: u64) -> Result<Envelope, StoreError> {
     let bad = |what: String| StoreError::Event { code: code.to_owned(), seq, what };
     serde_json::from_str(text).map_err(|e| bad(e.to_string()))
 }
 
-pub(super) fn load(connection: &Connection, path: &Path, code: &str) -> Result<SessionRecord, StoreError> {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
+pub(super) fn load(connection: &Connection, code: &str) -> Result<SessionRecord, StoreError> {
     let query = "SELECT seed, observers, simulated, begun_ms, ids, plan
                  FROM sessions LEFT JOIN plans USING (code) WHERE code = ?1";
     let mut plan = None;
@@ -124,29 +95,26 @@ pub(super) fn load(connection: &Connection, path: &Path, code: &str) -> Result<S
             events: Vec::new(),
         })
     };
-    let found = connection.query_row(query, [code], record).optional().map_err(failed)?;
+    let found = connection.query_row(query, [code], record).optional()?;
     let mut record = found.ok_or_else(|| StoreError::Unknown(code.to_owned()))?;
     let parsed = plan.map(|text| serde_json::from_str(&text)).transpose();
     record.plan = parsed.map_err(|_| StoreError::Plan { code: code.to_owned() })?;
     let query = "SELECT seq, received_ms, envelope FROM events WHERE code = ?1 ORDER BY seq";
-    let mut statement = connection.prepare_cached(query).map_err(failed)?;
-    let rows = statement
-        .query_map([code], |row| Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?)))
-        .and_then(Iterator::collect::<rusqlite::Result<Vec<(u64, u64, String)>>>)
-        .map_err(failed)?;
-    for (seq, received, text) in rows {
+    let mut statement = connection.prepare_cached(query)?;
+    let rows = statement.query_map([code], |row| Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?)))?;
+    for row in rows {
+        let (seq, received, text): (u64, u64, String) = row?;
         record.received_ms.push(received);
         record.events.push(parse(&text, code, seq)?);
     }
     Ok(record)
 }
 
-pub(super) fn erase(connection: &Connection, path: &Path, code: &str) -> Result<(), StoreError> {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    connection.execute("DELETE FROM events WHERE code = ?1", [code]).map_err(failed)?;
+pub(super) fn erase(connection: &Connection, code: &str) -> Result<(), StoreError> {
+    connection.execute("DELETE FROM events WHERE code = ?1", [code])?;
     // Used up: it does not begin another session
-    connection.execute("DELETE FROM links WHERE code = ?1", [code]).map_err(failed)?;
-    match connection.execute("DELETE FROM sessions WHERE code = ?1", [code]).map_err(failed)? {
+    connection.execute("DELETE FROM links WHERE code = ?1", [code])?;
+    match connection.execute("DELETE FROM sessions WHERE code = ?1", [code])? {
         0 => Err(StoreError::Unknown(code.to_owned())),
         _ => Ok(()),
     }

@@ -1,6 +1,6 @@
 //! The thread that writes.
 
-use super::database::open;
+use super::database::{Mode, open};
 use super::record::{NewSession, SessionRecord};
 use super::rows::{all_codes, append, begin, erase, event, keep_plans, load, scrub};
 use crate::config::Study;
@@ -18,109 +18,117 @@ const MOST_AT_ONCE: usize = 512;
 #[derive(Clone, Debug)]
 pub struct AnswerStore {
     commands: mpsc::Sender<Command>,
+    path: Arc<Path>,
 }
 
-type Reply<T> = oneshot::Sender<Result<T, StoreError>>;
-
-enum Command {
-    KeepPlans { study: Arc<Study>, reply: Reply<()> },
-    Begin { session: Box<NewSession>, reply: Reply<String> },
-    Append { code: String, envelope: Box<Envelope>, reply: Reply<()> },
-    Load { code: String, reply: Reply<SessionRecord> },
-    Codes { reply: Reply<Vec<String>> },
-    Event { code: String, seq: u64, reply: Reply<Option<Envelope>> },
-    Erase { code: String, reply: Reply<()> },
+struct Command {
+    /// Whether it erases rows.
+    erases: bool,
+    work: Work,
 }
+
+/// Runs in a transaction, or in none if none could be begun.
+type Work = Box<dyn FnOnce(Result<&Connection, rusqlite::Error>) -> Held + Send>;
+
+/// A pending reply, sent after the commit with its failure, if any.
+type Held = Box<dyn FnOnce(Option<rusqlite::Error>) + Send>;
 
 impl AnswerStore {
     /// Opens the database of a study, creating it if needed. `design` identifies what the answers depend on
     /// ([`crate::Study::design`]).
     pub fn open(path: impl AsRef<Path>, design: &str) -> Result<Self, StoreError> {
-        let path = path.as_ref().to_owned();
+        let path: Arc<Path> = path.as_ref().into();
         // A log that is left is of a server that was killed: perhaps before it had removed what it erased
         let log = PathBuf::from([path.as_os_str(), OsStr::new("-wal")].into_iter().collect::<OsString>());
         let killed = std::fs::metadata(log).is_ok_and(|log| log.len() > 0);
-        let mut connection = open(&path, design)?;
+        let mut connection = open(&path, Mode::Create, design).map_err(|fault| fault.at(&path))?;
         if killed {
             scrub(&connection);
         }
         let (commands, received) = mpsc::channel();
-        let work = move || write(&mut connection, &path, &received);
+        let work = move || write(&mut connection, &received);
         std::thread::Builder::new().name("answers".into()).spawn(work).map_err(|_| StoreError::Closed)?;
-        Ok(Self { commands })
+        Ok(Self { commands, path })
     }
 
     /// Draws and stores the trials of sessions that were begun before trials were stored.
     pub(crate) async fn keep_plans(&self, study: Arc<Study>) -> Result<(), StoreError> {
-        self.ask(|reply| Command::KeepPlans { study, reply }).await
+        self.ask(false, move |connection| keep_plans(connection, &study)).await
     }
 
     /// Begins a session and returns its code. A link that was used before leads to the session it began.
     pub async fn begin(&self, session: NewSession) -> Result<String, StoreError> {
-        let session = Box::new(session);
-        self.ask(|reply| Command::Begin { session, reply }).await
+        self.ask(false, move |connection| begin(connection, &session)).await
     }
 
     /// The codes of all sessions, in the order they began.
     pub async fn codes(&self) -> Result<Vec<String>, StoreError> {
-        self.ask(|reply| Command::Codes { reply }).await
+        self.ask(false, |connection| Ok(all_codes(connection)?)).await
     }
 
     /// Stores an event. It is on disk when this returns.
     pub(crate) async fn append(&self, code: &str, envelope: Envelope) -> Result<(), StoreError> {
-        let (code, envelope) = (code.to_owned(), Box::new(envelope));
-        self.ask(|reply| Command::Append { code, envelope, reply }).await
+        let code = code.to_owned();
+        self.ask(false, move |connection| append(connection, &code, &envelope)).await
     }
 
     /// Loads a session with all its events.
     pub async fn load(&self, code: &str) -> Result<SessionRecord, StoreError> {
         let code = code.to_owned();
-        self.ask(|reply| Command::Load { code, reply }).await
+        self.ask(false, move |connection| load(connection, &code)).await
     }
 
     /// Loads one event of a session, if it exists.
     pub async fn event(&self, code: &str, seq: u64) -> Result<Option<Envelope>, StoreError> {
         let code = code.to_owned();
-        self.ask(|reply| Command::Event { code, seq, reply }).await
+        self.ask(false, move |connection| event(connection, &code, seq)).await
     }
 
     /// Erases a session and all its events, including their traces in free pages and the log.
     pub async fn erase(&self, code: &str) -> Result<(), StoreError> {
         let code = code.to_owned();
-        self.ask(|reply| Command::Erase { code, reply }).await
+        self.ask(true, move |connection| erase(connection, &code)).await
     }
 
-    async fn ask<T>(&self, command: impl FnOnce(Reply<T>) -> Command) -> Result<T, StoreError> {
+    async fn ask<T: Send + 'static>(
+        &self,
+        erases: bool,
+        work: impl FnOnce(&Connection) -> Result<T, StoreError> + Send + 'static,
+    ) -> Result<T, StoreError> {
         let (reply, answer) = oneshot::channel();
-        self.commands.send(command(reply)).map_err(|_| StoreError::Closed)?;
-        answer.await.map_err(|_| StoreError::Closed)?
+        let work = |connection: Result<&Connection, rusqlite::Error>| -> Held {
+            let result = connection.map_err(StoreError::from).and_then(work);
+            Box::new(move |failure| {
+                let result = failure.map_or(result, |failure| Err(failure.into()));
+                // A dropped receiver needs no reply
+                drop(reply.send(result));
+            })
+        };
+        let command = Command { erases, work: Box::new(work) };
+        self.commands.send(command).map_err(|_| StoreError::Closed)?;
+        answer.await.map_err(|_| StoreError::Closed)?.map_err(|fault| fault.at(&self.path))
     }
 }
 
-/// A pending reply, sent after the commit.
-type Held = Box<dyn FnOnce(Option<rusqlite::Error>) + Send>;
-
 /// The writer thread; ends when every [`AnswerStore`] has been dropped.
-fn write(connection: &mut Connection, path: &Path, commands: &mpsc::Receiver<Command>) {
+fn write(connection: &mut Connection, commands: &mpsc::Receiver<Command>) {
     while let Ok(first) = commands.recv() {
-        let mut erased = false;
         let mut batch = vec![first];
         batch.extend(commands.try_iter().take(MOST_AT_ONCE - 1));
+        let erased = batch.iter().any(|command| command.erases);
 
         // One transaction for the batch; replies wait until it is on disk
-        let mut held: Vec<Held> = Vec::with_capacity(batch.len());
-        let transaction = match connection.transaction_with_behavior(TransactionBehavior::Immediate) {
-            Ok(transaction) => transaction,
-            Err(error) => {
-                refuse(batch, path, &error);
-                continue;
-            }
-        };
-        for command in batch {
-            erased |= matches!(command, Command::Erase { .. });
-            held.push(run(&transaction, path, command));
-        }
-        let failure = transaction.commit().err();
+        let (held, failure): (Vec<Held>, _) =
+            match connection.transaction_with_behavior(TransactionBehavior::Immediate) {
+                Ok(transaction) => {
+                    let held = batch.into_iter().map(|command| (command.work)(Ok(&transaction))).collect();
+                    (held, transaction.commit().err())
+                }
+                Err(error) => {
+                    let refused = batch.into_iter().map(|command| (command.work)(Err(copy(&error))));
+                    (refused.collect(), Some(error))
+                }
+            };
         // An erasure is acknowledged when nothing is left of it, in the log either
         if erased && failure.is_none() {
             scrub(connection);
@@ -139,54 +147,9 @@ fn copy(error: &rusqlite::Error) -> rusqlite::Error {
     }
 }
 
-fn refuse(batch: Vec<Command>, path: &Path, error: &rusqlite::Error) {
-    let failed = || StoreError::Database { path: path.to_owned(), source: copy(error) };
-    for command in batch {
-        // A dropped receiver needs no reply
-        match command {
-            Command::Append { reply, .. }
-            | Command::Erase { reply, .. }
-            | Command::KeepPlans { reply, .. } => {
-                drop(reply.send(Err(failed())));
-            }
-            Command::Begin { reply, .. } => drop(reply.send(Err(failed()))),
-            Command::Codes { reply } => drop(reply.send(Err(failed()))),
-            Command::Load { reply, .. } => drop(reply.send(Err(failed()))),
-            Command::Event { reply, .. } => drop(reply.send(Err(failed()))),
-        }
-    }
-}
-
-fn hold<T: Send + 'static>(path: &Path, reply: Reply<T>, result: Result<T, StoreError>) -> Held {
-    let path: PathBuf = path.to_owned();
-    Box::new(move |failure| {
-        let result = match failure {
-            Some(source) => Err(StoreError::Database { path, source }),
-            None => result,
-        };
-        drop(reply.send(result));
-    })
-}
-
-fn run(connection: &Connection, path: &Path, command: Command) -> Held {
-    let failed = |source| StoreError::Database { path: path.to_owned(), source };
-    match command {
-        Command::KeepPlans { study, reply } => hold(path, reply, keep_plans(connection, path, &study)),
-        Command::Begin { session, reply } => hold(path, reply, begin(connection, path, &session)),
-        Command::Codes { reply } => hold(path, reply, all_codes(connection).map_err(failed)),
-        Command::Append { code, envelope, reply } => {
-            hold(path, reply, append(connection, path, &code, &envelope))
-        }
-        Command::Load { code, reply } => hold(path, reply, load(connection, path, &code)),
-        Command::Event { code, seq, reply } => hold(path, reply, event(connection, path, &code, seq)),
-        Command::Erase { code, reply } => hold(path, reply, erase(connection, path, &code)),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::database::settle;
     use std::collections::BTreeMap;
 
     /// Sixteen bytes that stand nowhere else.
@@ -232,10 +195,9 @@ mod tests {
             std::fs::create_dir(folder).unwrap();
         }
         let path = there.join("answers.sqlite");
-        let connection = open(&path, "a design").unwrap();
-        settle(&connection).unwrap();
-        begin(&connection, &path, &session("CODE00000000")).unwrap();
-        erase(&connection, &path, "CODE00000000").unwrap();
+        let connection = open(&path, Mode::Create, "a design").unwrap();
+        begin(&connection, &session("CODE00000000")).unwrap();
+        erase(&connection, "CODE00000000").unwrap();
         // What a kill leaves
         for file in ["answers.sqlite", "answers.sqlite-wal"] {
             std::fs::copy(there.join(file), copy.join(file)).unwrap();

@@ -1,56 +1,10 @@
-use crate::kit::{Folder, Running, levels, public};
+use crate::kit::{Folder, JSON, Running, levels, public, refused};
 use noisefloor_study::simulated::drive;
 use noisefloor_testkit::HANG;
+use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::TcpStream;
-
-/// One answer: status, headers in lower case, body.
-struct Answer {
-    status: u16,
-    head: String,
-    body: String,
-}
-
-/// Sends bytes as they are, and reads until the server closes.
-fn raw(server: &Running, bytes: &[u8]) -> Answer {
-    let mut stream = TcpStream::connect(server.address).unwrap();
-    stream.set_read_timeout(Some(HANG)).unwrap();
-    // The server may answer and close before it has read everything
-    drop(stream.write_all(bytes));
-    let mut text = Vec::new();
-    drop(stream.read_to_end(&mut text));
-    let text = String::from_utf8_lossy(&text).into_owned();
-    let (head, body) = text.split_once("\r\n\r\n").unwrap_or((&text, ""));
-    let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).unwrap_or(0);
-    Answer { status, head: head.to_lowercase(), body: body.to_owned() }
-}
-
-fn request(server: &Running, method: &str, path: &str, headers: &str, body: &str) -> Answer {
-    let host =
-        if headers.contains("host:") { String::new() } else { format!("host: {}\r\n", server.address) };
-    let length = body.len();
-    let text = format!(
-        "{method} {path} HTTP/1.1\r\n{host}connection: close\r\n\
-         content-length: {length}\r\n{headers}\r\n{body}"
-    );
-    raw(server, text.as_bytes())
-}
-
-const JSON: &str = "content-type: application/json\r\n";
-
-fn post(server: &Running, path: &str, body: &str) -> Answer {
-    request(server, "POST", path, JSON, body)
-}
-
-/// A refusal says what, where and what to do.
-fn refused(answer: &Answer, status: u16) {
-    assert_eq!(answer.status, status, "{} {}", answer.head, answer.body);
-    let body: serde_json::Value = serde_json::from_str(&answer.body).unwrap();
-    for part in ["what", "where", "what_to_do"] {
-        assert!(body[part].as_str().is_some_and(|s| s.len() > 1), "{part}: {}", answer.body);
-    }
-    assert!(!answer.body.contains("/tmp"), "paths of the machine: {}", answer.body);
-}
+use std::time::Instant;
 
 fn served() -> (Folder, Running) {
     let folder = Folder::new("acquisition", &["wall"], &levels(6, 2.0), "groups = [\"a\", \"b\"]");
@@ -58,28 +12,21 @@ fn served() -> (Folder, Running) {
     (folder, server)
 }
 
-/// A session that is at its first trial; its code and next number.
+/// A session that is at its first trial; its code.
 fn session(server: &Running) -> String {
-    let begun = post(server, "/api/sessions", "{\"group\":\"a\"}");
-    assert_eq!(begun.status, 201, "{}", begun.body);
-    let view: serde_json::Value = serde_json::from_str(&begun.body).unwrap();
+    let (status, view) = server.post("/api/sessions", &json!({ "group": "a" }));
+    assert_eq!(status, 201, "{view}");
     let code = view["code"].as_str().unwrap().to_owned();
-    let events = public(1, &[1.0, 1.0]).draw(0).arrive("en", &[]);
-    for (seq, event) in events.iter().enumerate() {
-        let event = serde_json::to_string(event).unwrap();
-        let body = format!("{{\"seq\":{seq},\"at\":1000,\"event\":{event}}}");
-        assert_eq!(post(server, &format!("/api/sessions/{code}/events"), &body).status, 200);
+    for (seq, event) in public(1, &[1.0, 1.0]).draw(0).arrive("en", &[]).iter().enumerate() {
+        let event = json!({ "seq": seq, "at": 1000, "event": event });
+        assert_eq!(server.post(&format!("/api/sessions/{code}/events"), &event).0, 200);
     }
     code
 }
 
-fn step(server: &Running, code: &str, seq: u64, level: u32) -> Answer {
-    let event = format!("{{\"kind\":\"step\",\"trial\":0,\"tile\":0,\"level\":{level},\"ms\":900}}");
-    post(
-        server,
-        &format!("/api/sessions/{code}/events"),
-        &format!("{{\"seq\":{seq},\"at\":1,\"event\":{event}}}"),
-    )
+fn step(server: &Running, code: &str, seq: u64, level: u32) -> (u16, Value) {
+    let event = json!({ "kind": "step", "trial": 0, "tile": 0, "level": level, "ms": 900 });
+    server.post(&format!("/api/sessions/{code}/events"), &json!({ "seq": seq, "at": 1, "event": event }))
 }
 
 #[test]
@@ -94,13 +41,13 @@ fn pages_and_tiles_are_served_under_a_strict_policy() {
         ("/api/study", "application/json"),
         ("/api/tiles/0/5/1.png", "image/png"),
     ] {
-        let answer = request(&server, "GET", path, "", "");
-        assert_eq!(answer.status, 200, "{path}");
-        assert!(answer.head.contains(&format!("content-type: {kind}")), "{path}: {}", answer.head);
-        assert!(answer.head.contains("content-security-policy: default-src 'none'; script-src 'self'"));
-        assert!(answer.head.contains("x-content-type-options: nosniff"));
+        let (status, head, _) = server.raw("GET", path, "", b"");
+        assert_eq!(status, 200, "{path}");
+        assert!(head.contains(&format!("content-type: {kind}")), "{path}: {head}");
+        assert!(head.contains("content-security-policy: default-src 'none'; script-src 'self'"));
+        assert!(head.contains("x-content-type-options: nosniff"));
     }
-    let page = request(&server, "GET", "/", "", "").body;
+    let page = String::from_utf8(server.raw("GET", "/", "", b"").2).unwrap();
     assert!(!page.contains("http:") && !page.contains("https:"), "the page names another machine");
     for path in [
         "/api/tiles/0/6/0.png",
@@ -115,16 +62,16 @@ fn pages_and_tiles_are_served_under_a_strict_policy() {
         "/../study.toml",
         "/api/nothing",
     ] {
-        refused(&request(&server, "GET", path, "", ""), 404);
+        refused(server.ask("GET", path, "", b""), 404);
     }
-    refused(&request(&server, "PUT", "/api/study", JSON, "{}"), 405);
+    refused(server.put("/api/study", &json!({})), 405);
 }
 
 #[test]
 fn requests_of_other_sites_and_hosts_are_refused() {
     let (_folder, server) = served();
-    let own = format!("origin: http://{}\r\n{JSON}", server.address);
-    assert_eq!(request(&server, "POST", "/api/sessions", &own, "{\"group\":\"a\"}").status, 201);
+    let begin = |headers: &str| server.ask("POST", "/api/sessions", headers, br#"{"group":"a"}"#);
+    assert_eq!(begin(&format!("origin: {}\r\n{JSON}", server.url)).0, 201);
     for (headers, status) in [
         ("host: evil.example\r\n".to_owned(), 421),
         (format!("host: evil.example:{}\r\n", server.address.port()), 421),
@@ -133,18 +80,14 @@ fn requests_of_other_sites_and_hosts_are_refused() {
         ("sec-fetch-site: cross-site\r\n".to_owned(), 403),
         ("sec-fetch-site: same-site\r\n".to_owned(), 403),
     ] {
-        let answer =
-            request(&server, "POST", "/api/sessions", &format!("{headers}{JSON}"), "{\"group\":\"a\"}");
-        refused(&answer, status);
-        refused(&request(&server, "GET", "/api/study", &headers, ""), status);
+        refused(begin(&format!("{headers}{JSON}")), status);
+        refused(server.ask("GET", "/api/study", &headers, b""), status);
     }
-    // What a form of another site could send without asking.
-    let form = "content-type: text/plain\r\n";
-    refused(&request(&server, "POST", "/api/sessions", form, "{\"group\":\"a\"}"), 415);
-    assert_eq!(
-        request(&server, "GET", "/", &format!("host: localhost:{}\r\n", server.address.port()), "").status,
-        200
-    );
+    // What a form of another site could send without asking
+    refused(begin("content-type: text/plain\r\n"), 415);
+    refused(begin(""), 415);
+    let local = format!("host: localhost:{}\r\n", server.address.port());
+    assert_eq!(server.raw("GET", "/", &local, b"").0, 200);
 }
 
 #[test]
@@ -157,30 +100,31 @@ fn malformed_and_oversized_requests_are_refused() {
         "{",
         "[]",
         "null",
-        "{\"seq\":2}",
-        "{\"seq\":-1,\"at\":0,\"event\":{\"kind\":\"pause\"}}",
-        "{\"seq\":2.5,\"at\":0,\"event\":{\"kind\":\"pause\"}}",
-        "{\"seq\":2,\"at\":0,\"event\":{\"kind\":\"shout\"}}",
-        "{\"seq\":2,\"at\":0,\"event\":{\"kind\":\"consent\",\"language\":\"en\",\"more\":1}}",
-        "{\"seq\":2,\"at\":0,\"extra\":1,\"event\":{\"kind\":\"pause\"}}",
-        "{\"seq\":2,\"at\":0,\"event\":{\"kind\":\"step\",\"trial\":0,\"tile\":0,\"level\":99999999999,\"ms\":9}}",
+        r#"{"seq":2}"#,
+        r#"{"seq":-1,"at":0,"event":{"kind":"pause"}}"#,
+        r#"{"seq":2.5,"at":0,"event":{"kind":"pause"}}"#,
+        r#"{"seq":2,"at":0,"event":{"kind":"shout"}}"#,
+        r#"{"seq":2,"at":0,"event":{"kind":"consent","language":"en","more":1}}"#,
+        r#"{"seq":2,"at":0,"extra":1,"event":{"kind":"pause"}}"#,
+        r#"{"seq":2,"at":0,"event":{"kind":"step","trial":0,"tile":0,"level":99999999999,"ms":9}}"#,
         "\u{0}\u{1}",
     ] {
-        refused(&post(&server, &events, body), 400);
+        refused(server.ask("POST", &events, JSON, body.as_bytes()), 400);
     }
-    refused(&post(&server, &events, &"[".repeat(10_000)), 400);
-    refused(&post(&server, &events, &" ".repeat(1 << 20)), 413);
-    refused(&post(&server, &events, "{\"seq\":2,\"at\":99999999999999,\"event\":{\"kind\":\"pause\"}}"), 422);
-    refused(&post(&server, "/api/sessions", "{\"group\":\"c\"}"), 422);
-    refused(&post(&server, "/api/sessions", "{}"), 400);
+    refused(server.ask("POST", &events, JSON, &[b'['; 10_000]), 400);
+    refused(server.ask("POST", &events, JSON, &[b' '; 1 << 20]), 413);
+    let late = json!({ "seq": 2, "at": 99_999_999_999_999u64, "event": { "kind": "pause" } });
+    refused(server.post(&events, &late), 422);
+    refused(server.post("/api/sessions", &json!({ "group": "c" })), 422);
+    refused(server.post("/api/sessions", &json!({})), 400);
     // Half a body, and bytes that are no HTTP: the server goes on.
     let half = format!(
         "POST {events} HTTP/1.1\r\nhost: {}\r\ncontent-length: 50\r\n{JSON}\r\n{{\"seq\"",
         server.address
     );
     TcpStream::connect(server.address).unwrap().write_all(half.as_bytes()).unwrap();
-    raw(&server, b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n");
-    assert_eq!(step(&server, &code, 2, 1).status, 200);
+    server.exchange(b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n");
+    assert_eq!(step(&server, &code, 2, 1).0, 200);
 }
 
 #[test]
@@ -188,20 +132,18 @@ fn repeated_and_forged_events_change_nothing() {
     let (folder, server) = served();
     let code = session(&server);
     let first = step(&server, &code, 2, 1);
-    assert_eq!(first.status, 200);
+    assert_eq!(first.0, 200);
     // Again: acknowledged again, and not counted twice.
-    let again = step(&server, &code, 2, 1);
-    assert_eq!((again.status, &again.body), (200, &first.body));
+    assert_eq!(step(&server, &code, 2, 1), first);
     // Another event of that number, a gap, and a step that cannot have happened.
-    refused(&step(&server, &code, 2, 2), 409);
-    refused(&step(&server, &code, 9, 2), 409);
-    refused(&step(&server, &code, 3, 4), 422);
-    let next: serde_json::Value = serde_json::from_str(&step(&server, &code, 3, 4).body).unwrap();
-    assert_eq!(next["next_seq"], 3);
-    assert_eq!(step(&server, &code, 3, 2).status, 200);
+    refused(step(&server, &code, 2, 2), 409);
+    refused(step(&server, &code, 9, 2), 409);
+    refused(step(&server, &code, 3, 4), 422);
+    assert_eq!(step(&server, &code, 3, 4).1["next_seq"], 3);
+    assert_eq!(step(&server, &code, 3, 2).0, 200);
     // Two requests of the same number at once: one event.
     std::thread::scope(|scope| {
-        let both = [0, 1].map(|_| scope.spawn(|| step(&server, &code, 4, 3).status));
+        let both = [0, 1].map(|_| scope.spawn(|| step(&server, &code, 4, 3).0));
         for status in both.map(|t| t.join().unwrap()) {
             assert_eq!(status, 200);
         }
@@ -217,20 +159,20 @@ fn codes_are_needed_and_cannot_be_tried() {
     let code = session(&server);
     // As it was noted down: lower case, with hyphens.
     let noted = format!("{}-{}-{}", &code[..4], &code[4..8], &code[8..]).to_lowercase();
-    assert_eq!(request(&server, "GET", &format!("/api/sessions/{noted}"), "", "").status, 200);
-    assert_eq!(request(&server, "GET", &format!("/api/sessions/{code}/export"), "", "").status, 200);
-    assert_eq!(request(&server, "DELETE", &format!("/api/sessions/{code}"), "", "").status, 204);
-    refused(&request(&server, "GET", &format!("/api/sessions/{code}"), "", ""), 404);
-    refused(&step(&server, &code, 2, 1), 404);
-    refused(&request(&server, "DELETE", &format!("/api/sessions/{code}"), "", ""), 404);
+    server.get(&format!("/api/sessions/{noted}"));
+    server.get(&format!("/api/sessions/{code}/export"));
+    assert_eq!(server.delete(&format!("/api/sessions/{code}")).0, 204);
+    refused(server.ask("GET", &format!("/api/sessions/{code}"), "", b""), 404);
+    refused(step(&server, &code, 2, 1), 404);
+    refused(server.delete(&format!("/api/sessions/{code}")), 404);
     // Guesses are refused after thirty different ones; a session under way goes on meanwhile.
     let valid = session(&server);
     for wrong in 0..40 {
-        let status = request(&server, "GET", &format!("/api/sessions/{wrong:012}"), "", "").status;
+        let (status, _) = server.ask("GET", &format!("/api/sessions/{wrong:012}"), "", b"");
         assert_eq!(status, if wrong < 29 { 404 } else { 429 }, "{wrong}");
     }
-    assert_eq!(step(&server, &valid, 2, 1).status, 200);
-    assert_eq!(request(&server, "GET", &format!("/api/sessions/{valid}"), "", "").status, 200);
+    assert_eq!(step(&server, &valid, 2, 1).0, 200);
+    server.get(&format!("/api/sessions/{valid}"));
 }
 
 /// A server that is started again goes on with the sessions that were under way.
@@ -238,13 +180,12 @@ fn codes_are_needed_and_cannot_be_tried() {
 fn sessions_outlive_the_server() {
     let (folder, server) = served();
     let code = session(&server);
-    assert_eq!(step(&server, &code, 2, 1).status, 200);
+    assert_eq!(step(&server, &code, 2, 1).0, 200);
     drop(server);
     let server = Running::start(folder.study());
-    let view = request(&server, "GET", &format!("/api/sessions/{code}"), "", "").body;
-    let view: serde_json::Value = serde_json::from_str(&view).unwrap();
+    let view = server.get(&format!("/api/sessions/{code}"));
     assert_eq!((&view["next_seq"], &view["trial"]["levels"][0]), (&3.into(), &1.into()));
-    assert_eq!(step(&server, &code, 3, 2).status, 200);
+    assert_eq!(step(&server, &code, 3, 2).0, 200);
 }
 
 /// Answers to one design are not taken for answers to another.
@@ -272,24 +213,52 @@ fn simulated_observers_need_the_operator_and_are_not_paid() {
                 completion-url = \"https://example.org/paid\"\n\
                 screened-out-url = \"https://example.org/out\"";
     let folder = Folder::new("acquisition", &["wall"], &levels(6, 2.0), more);
-    let begin = r#"{"group":"","simulated":true}"#;
+    let (unlinked, simulated) = (json!({ "group": "" }), json!({ "group": "", "simulated": true }));
     let people = Running::for_people(folder.study());
-    let answer = post(&people, "/api/sessions", begin);
-    refused(&answer, 422);
-    assert!(
-        answer.body.contains("not admitted") && answer.body.contains("study simulate"),
-        "{}",
-        answer.body
-    );
-    refused(&post(&people, "/api/sessions", r#"{"group":""}"#), 422);
+    let answer = people.post("/api/sessions", &simulated);
+    let said = answer.1.to_string();
+    assert!(said.contains("not admitted") && said.contains("study simulate"), "{said}");
+    refused(answer, 422);
+    refused(people.post("/api/sessions", &unlinked), 422);
     drop(people);
 
     let rehearsal = Running::start(folder.study());
-    refused(&post(&rehearsal, "/api/sessions", r#"{"group":""}"#), 422);
+    refused(rehearsal.post("/api/sessions", &unlinked), 422);
     let code = drive(&rehearsal.url, "", &mut public(1, &[150.0, 600.0]).draw(1), |_| ()).unwrap();
-    let view = request(&rehearsal, "GET", &format!("/api/sessions/{code}"), "", "");
-    let view: serde_json::Value = serde_json::from_str(&view.body).unwrap();
+    let view = rehearsal.get(&format!("/api/sessions/{code}"));
     assert_eq!(view["stage"], "finished", "{view}");
     let completion = &view["completion"];
     assert!(completion["code"].is_null() && completion["url"].is_null(), "{completion}");
+}
+
+/// Half a header keeps neither a connection nor the server: it is closed in time, and the server ends without
+/// it.
+#[test]
+fn half_sent_headers_hold_nothing() {
+    let (_folder, server) = served();
+    let half = |text: &str| {
+        let mut stream = TcpStream::connect(server.address).unwrap();
+        stream.write_all(text.as_bytes()).unwrap();
+        stream.set_read_timeout(Some(HANG)).unwrap();
+        stream
+    };
+    let mut slow = half("GET / HTTP/1.1\r\nhost: ");
+    let (begun, mut said) = (Instant::now(), Vec::new());
+    drop(slow.read_to_end(&mut said));
+    assert!(begun.elapsed() < HANG, "closed after {:?}", begun.elapsed());
+
+    let held: Vec<TcpStream> = (0..20).map(|_| half("POST /api/sessions HTTP/1.1\r\nhost")).collect();
+    let begun = Instant::now();
+    drop(server);
+    assert!(begun.elapsed() < HANG, "ended after {:?}", begun.elapsed());
+    drop(held);
+}
+
+/// More connections than the server takes: the others wait, and are served once these are closed.
+#[test]
+fn connections_are_bounded_and_recover() {
+    let (_folder, server) = served();
+    let held: Vec<TcpStream> = (0..300).filter_map(|_| TcpStream::connect(server.address).ok()).collect();
+    assert!(held.len() > 250, "{}", held.len());
+    assert!(server.get("/api/study")["stacks"].is_array());
 }

@@ -1,17 +1,13 @@
 use crate::explore::table;
-use crate::kit::{Running, Served, film, levels, stack};
+use crate::kit::{Running, film, levels, stack};
 use noisefloor::{Oracle, People, descriptor::Descriptor, evidence::Evidence};
 use noisefloor_eyes::Eyes;
-use noisefloor_learn::{Corpora, describe_corpora};
-use noisefloor_learn::{TrainParams, train};
-use noisefloor_learn::{predict, score};
+use noisefloor_learn::{Corpora, TrainParams, describe_corpora, predict, score, train};
 use noisefloor_pages::calibrate::{CalibrateServer, CalibrateSetup};
 use noisefloor_pages::http::Exposure;
-use noisefloor_study::analysis::CorpusThreshold;
-use noisefloor_study::analysis::files::write;
-use noisefloor_study::analysis::{AnalysisOptions, analyse};
+use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse, files::write};
 use noisefloor_study::explore::ExploreSetup;
-use noisefloor_study::simulated::{Public, SimulatedObserver, SpreadShape};
+use noisefloor_study::simulated::{Public, SimulatedObserver};
 use noisefloor_study::{StackView, Study, StudyEvent, Trial, store};
 use noisefloor_testkit::{Requirement, require};
 use std::path::{Path, PathBuf};
@@ -246,11 +242,11 @@ fn pictures_are_explored_in_a_browser() {
         ["00050.png", "03000.png", "25600.png", "last.png"].iter().map(|name| folder.join(name)).collect();
     let files =
         serde_json::json!({ "stack": files, "other": dir.path().join("other/00050.png") }).to_string();
-    let server = Served::explorer(ExploreSetup {
+    let server = Running::explorer(ExploreSetup {
         table: Some(table()),
         ..ExploreSetup::new(dir.path().join("explore.sqlite"))
     });
-    run("explore.test.mjs", &[("EXPLORER", &format!("http://{}", server.address)), ("STACK", &files)]);
+    run("explore.test.mjs", &[("EXPLORER", &server.url), ("STACK", &files)]);
 }
 
 /// Whole calibrations, with keys alone, by somebody who looks at the pixels and by somebody who does not:
@@ -333,15 +329,7 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
 
     // What each observer does at each of the two showings of each stack, by src/simulated.
     let thresholds = vec![vec![100.0, 140.0, 200.0, 280.0], vec![120.0, 160.0, 220.0, 260.0]];
-    let public = Public {
-        thresholds,
-        shape: SpreadShape::Logistic,
-        between: 0.25,
-        by_place: 0.0,
-        within: 0.1,
-        lapse: 0.01,
-        bias: 0.1,
-    };
+    let public = Public { between: 0.25, within: 0.1, lapse: 0.01, bias: 0.1, ..Public::of(thresholds) };
     let view = StackView { width: 128, height: 128, tile: 64, levels: levels.clone(), frames: 1, fps: None };
     let views = [view.clone(), view];
     let decisions: Vec<Vec<Vec<Vec<u32>>>> = (0..OBSERVERS)

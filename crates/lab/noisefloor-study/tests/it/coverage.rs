@@ -1,11 +1,11 @@
-use crate::kit::Folder;
+use crate::kit::{Folder, levels};
 use noisefloor_study::analysis::{AnalysisOptions, Observer, PeopleSpread, StudyReport, report, spreads};
-use noisefloor_study::simulated::{Public, SpreadShape, run};
+use noisefloor_study::simulated::{Public, run};
 use noisefloor_study::{ParticipantSession, Plan, Study, grids};
 use std::sync::Arc;
 
-/// A study of so many simulated observers, without a server.
-fn simulated(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> (StudyReport, Vec<Observer>) {
+/// So many simulated observers of a study, without a server.
+fn observed(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> Vec<Observer> {
     let grids = grids(study);
     let observe = |i: u64| {
         let seed = 1000 * seed + i;
@@ -13,8 +13,12 @@ fn simulated(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> 
         run(&mut session, &mut public.draw(seed)).unwrap();
         Observer::of(&format!("simulated {i}"), "", &session)
     };
-    let all: Vec<Observer> = (0..observers).map(observe).collect();
-    (report(study, &all, AnalysisOptions { keep_excluded: false, seed, simulated: true }), all)
+    (0..observers).map(observe).collect()
+}
+
+fn reported(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> StudyReport {
+    let options = AnalysisOptions { keep_excluded: false, seed, simulated: true };
+    report(study, &observed(study, public, observers, seed), options)
 }
 
 /// Shares of intervals that hold the truth: of the median, and of the level where 95 % see no difference;
@@ -24,8 +28,7 @@ fn coverage(study: &Arc<Study>, public: &Public, observers: u64, studies: u64) -
     let truths: Vec<[f64; 2]> = (0..2).map(|tile| [truth(tile, 0.5), truth(tile, 0.95)]).collect();
     let (mut median, mut level95, mut ratio) = (0.0, 0.0, 0.0);
     for seed in 0..studies {
-        let (report, _) = simulated(study, public, observers, seed);
-        for tile in &report.tiles {
+        for tile in &reported(study, public, observers, seed).tiles {
             let holds = |interval: Option<[f64; 2]>, truth: f64| {
                 f64::from(interval.is_some_and(|[low, high]| low <= truth && truth <= high))
             };
@@ -47,15 +50,7 @@ fn papers(protocol: &str, extra: &str) -> (Folder, Arc<Study>) {
 }
 
 fn public(within: f64, lapse: f64) -> Public {
-    Public {
-        thresholds: vec![vec![1000.0, 2500.0]],
-        shape: SpreadShape::Logistic,
-        between: 0.25,
-        by_place: 0.0,
-        within,
-        lapse,
-        bias: 0.0,
-    }
+    Public { between: 0.25, within, lapse, ..Public::of(vec![vec![1000.0, 2500.0]]) }
 }
 
 /// 33 observers, as in the paper. Of 40 studies with two tiles, 95 % of intervals should hold the truth.
@@ -75,12 +70,11 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
 /// of 0.45 in ln(spp), the mean over twelve studies is known to 0.45/√396 = 0.023, times 3.
 #[test]
 fn means_are_those_of_thresholds_not_of_levels() {
-    let levels: Vec<u64> = (0..24).map(|i| (10.0 * 1.35f64.powi(i)).round() as u64).collect();
-    let folder = Folder::new("acquisition", &["wall"], &levels, "");
+    let folder = Folder::new("acquisition", &["wall"], &levels(24, 1.35), "");
     let (study, public) = (folder.study(), public(0.1, 0.0));
     let (mut ratio, mut holds) = (0.0, 0);
     for seed in 0..12 {
-        for tile in &simulated(&study, &public, 33, seed).0.tiles {
+        for tile in &reported(&study, &public, 33, seed).tiles {
             let truth = public.levels(0, tile.tile)[1];
             ratio += (tile.mean / truth).ln() / 24.0;
             holds += usize::from(tile.mean_interval.is_some_and(|[low, high]| low <= truth && truth <= high));
@@ -94,7 +88,7 @@ fn means_are_those_of_thresholds_not_of_levels() {
 
 /// Root mean square error of single observers' ln(threshold), and clicks a tile.
 fn precision(study: &Arc<Study>, public: &Public, observers: u64) -> (f64, f64) {
-    let (_, all) = simulated(study, public, observers, 7);
+    let all = observed(study, public, observers, 7);
     let mut squares = 0.0;
     for (i, observer) in all.iter().enumerate() {
         let truth = public.draw(7000 + i as u64);
@@ -146,14 +140,7 @@ fn spread_by(study: &Study, deviation: f64) -> Public {
 }
 
 fn found_spread(study: &Arc<Study>, public: &Public, observers: u64, seed: u64) -> PeopleSpread {
-    let grids = grids(study);
-    let observe = |i: u64| {
-        let seed = 1000 * seed + i;
-        let mut session = ParticipantSession::new(study.clone(), grids.clone(), Plan::draw(study, seed));
-        run(&mut session, &mut public.draw(seed)).unwrap();
-        Observer::of(&format!("simulated {i}"), "", &session)
-    };
-    let all: Vec<Observer> = (0..observers).map(observe).collect();
+    let all = observed(study, public, observers, seed);
     spreads(study, &all.iter().collect::<Vec<_>>()).swap_remove(0)
 }
 

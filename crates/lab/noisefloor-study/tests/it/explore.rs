@@ -1,6 +1,7 @@
-use crate::kit::{Picturing, Served, stack};
+use crate::kill::process;
+use crate::kit::{Running, stack};
 use noisefloor::{
-    Model, Oracle, People, TileGrid, ToneMapping, Viewing,
+    Model, Oracle, People, TileGrid, ToneMapping,
     descriptor::Descriptor,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
@@ -12,14 +13,16 @@ use noisefloor_testkit::HANG;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A folder with two stages and a reference of one rendering, 128×64 pixels.
-fn pictures(dir: &Path) -> Vec<std::path::PathBuf> {
+/// Two stages and a reference of one rendering, 128×64 pixels, in a new folder.
+pub(crate) fn setup(dir: &Path) -> ExploreSetup {
     stack(&dir.join("wall"), (128, 64), &[100, 400, 1600]);
-    [100, 400, 1600].map(|spp| dir.join(format!("wall/{spp:05}.png"))).to_vec()
+    setup_of(dir)
 }
 
-pub(crate) fn setup(dir: &Path) -> ExploreSetup {
-    ExploreSetup { pictures: pictures(dir), tile: 64, ..ExploreSetup::new(dir.join("explore.sqlite")) }
+/// The same of a folder that has them.
+pub(crate) fn setup_of(dir: &Path) -> ExploreSetup {
+    let pictures = [100, 400, 1600].map(|spp| dir.join(format!("wall/{spp:05}.png"))).to_vec();
+    ExploreSetup { pictures, tile: 64, ..ExploreSetup::new(dir.join("explore.sqlite")) }
 }
 
 pub(crate) fn question(picture: &Value) -> Value {
@@ -49,7 +52,7 @@ fn judged(
 #[test]
 fn verdicts_and_descriptors_are_those_of_judge() {
     let dir = tempfile::tempdir().unwrap();
-    let server = Served::explorer(setup(dir.path()));
+    let server = Running::explorer(setup(dir.path()));
     let state = server.get("/api/state");
     let shown = state["pictures"].as_array().unwrap();
     assert_eq!(shown.iter().map(|p| p["spp"].as_f64().unwrap()).collect::<Vec<_>>(), [100.0, 400.0, 1600.0]);
@@ -134,7 +137,7 @@ fn texts_are_complete_in_both_languages() {
 #[test]
 fn people_and_audience_move_verdicts() {
     let dir = tempfile::tempdir().unwrap();
-    let server = Served::explorer(setup(dir.path()));
+    let server = Running::explorer(setup(dir.path()));
     let picture = server.get("/api/state")["pictures"][1].clone();
     let ask = |people: f64, audience: [f64; 2]| {
         let mut asked = question(&picture);
@@ -164,7 +167,7 @@ fn people_and_audience_move_verdicts() {
 #[test]
 fn answers_become_a_line() {
     let dir = tempfile::tempdir().unwrap();
-    let server = Served::explorer(setup(dir.path()));
+    let server = Running::explorer(setup(dir.path()));
     let line = || server.post("/api/line", &json!({ "people": 0.9 }));
     assert_eq!(line(), (200, Value::Null));
     let state = server.get("/api/state");
@@ -190,8 +193,9 @@ fn answers_become_a_line() {
 #[test]
 fn a_single_picture_is_told_what_is_missing() {
     let dir = tempfile::tempdir().unwrap();
-    let one = || vec![pictures(dir.path())[0].clone()];
-    let server = Served::explorer(ExploreSetup { pictures: one(), ..setup(dir.path()) });
+    let mut one = setup(dir.path());
+    one.pictures.truncate(1);
+    let server = Running::explorer(one);
     let picture = server.get("/api/state")["pictures"][0].clone();
     let (status, said) = server.post("/api/verdicts", &question(&picture));
     assert_eq!(status, 422);
@@ -203,7 +207,7 @@ fn a_single_picture_is_told_what_is_missing() {
 #[test]
 fn answers_follow_the_name_of_their_scene() {
     let dir = tempfile::tempdir().unwrap();
-    let server = Served::explorer(setup(dir.path()));
+    let server = Running::explorer(setup(dir.path()));
     let pictures = server.get("/api/state")["pictures"].clone();
     let disagree = |at: usize| {
         let said = json!({ "question": question(&pictures[at]), "tile": 0, "sees_noise": true });
@@ -221,25 +225,14 @@ fn answers_follow_the_name_of_their_scene() {
     assert_eq!(scenes(), ["hall", "hall"]);
 }
 
+/// Killed (SIGKILL) right after the acknowledgement, five times: the disagreement is there. Whoever answers
+/// again for a tile changes the answer.
 #[test]
 fn a_killed_explorer_has_lost_nothing() {
-    kill_explorers(5);
-}
-
-/// `cargo test -p noisefloor-study --test it -- --ignored --nocapture a_hundred`
-#[test]
-#[ignore = "five kills are in the suite"]
-fn a_hundred_killed_explorers_have_lost_nothing() {
-    kill_explorers(100);
-}
-
-/// Killed (SIGKILL) right after the acknowledgement, a number of times: the disagreement is there. Whoever
-/// answers again for a tile changes the answer.
-fn kill_explorers(kills: usize) {
     let dir = tempfile::tempdir().unwrap();
-    pictures(dir.path());
-    for round in 0..kills {
-        let (mut child, server) = Picturing::process(dir.path());
+    setup(dir.path());
+    for round in 0..5 {
+        let (mut child, server) = process(dir.path());
         let picture = server.get("/api/state")["pictures"][round % 3].clone();
         // The opposite of what was said of this picture before
         let sees_noise = [0, 1].map(|tile| (tile + round / 3) % 2 == 0);
@@ -277,7 +270,6 @@ fn a_database_of_something_else_is_refused() {
 
 /// Four scenes where people stop where noise is no longer too strong.
 pub(crate) fn table() -> Table {
-    let descriptor = Descriptor::default();
     let mut random = fastrand::Rng::with_seed(5);
     let mut zone = |scene: usize, zone: u32| {
         let texture = 1.0 + random.f32();
@@ -302,17 +294,7 @@ pub(crate) fn table() -> Table {
         }
     };
     let zones = (0..4).flat_map(|s| (0..5).map(move |z| (s, z))).map(|(s, z)| zone(s, z)).collect();
-    let tone_mapping = ToneMapping::Srgb { exposure: 1.0 };
-    let numbers = descriptor.number_names();
-    Table {
-        descriptor,
-        evidence: Evidence::Halves,
-        tone_mapping,
-        viewing: Viewing::default(),
-        numbers,
-        zones,
-        answers: Vec::new(),
-    }
+    Table::new(Descriptor::default(), Evidence::Halves, zones)
 }
 
 /// Learned in the background, on the server: P of the tile that was disagreed with moves the way that was
@@ -321,7 +303,7 @@ pub(crate) fn table() -> Table {
 #[test]
 fn retraining_moves_p_and_says_what_it_costs() {
     let dir = tempfile::tempdir().unwrap();
-    let server = Served::explorer(ExploreSetup { table: Some(table()), ..setup(dir.path()) });
+    let server = Running::explorer(ExploreSetup { table: Some(table()), ..setup(dir.path()) });
     let (status, said) = server.post("/api/retrain", &json!({ "people": 0.9 }));
     assert!(status == 422 && said["where"] == "disagreements", "{said}");
     let state = server.get("/api/state");
@@ -401,7 +383,7 @@ fn retraining_moves_p_and_says_what_it_costs() {
 #[test]
 fn the_map_of_jods_is_the_vision_models() {
     let dir = tempfile::tempdir().unwrap();
-    let server = Served::explorer(setup(dir.path()));
+    let server = Running::explorer(setup(dir.path()));
     let state = server.get("/api/state");
     let brightness = |at: usize| {
         let id = state["pictures"][at]["id"].as_str().unwrap();

@@ -1,97 +1,65 @@
-use crate::kit::{Folder, levels, public};
-use noisefloor_pages::http::Exposure;
-use noisefloor_study::explore::{ExploreServer, ExploreSetup};
+use crate::explore;
+use crate::kit::{Folder, Running, levels, public};
 use noisefloor_study::simulated::drive;
-use noisefloor_study::{Study, StudyServer, store};
+use noisefloor_study::{Study, store};
 use noisefloor_testkit::HANG;
 use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Names the study for [`serve_for_another_process`].
-pub(crate) const STUDY: &str = "NOISEFLOOR_TEST_STUDY";
+const STUDY: &str = "NOISEFLOOR_TEST_STUDY";
 
-/// Not a test: the server, when another test starts this program again with a study. It prints its address,
-/// and runs until it is killed.
+/// Not a test: the server, when another test starts this program again with a study, or an explorer, with a
+/// folder. It prints its address, and runs until it is killed.
 #[test]
 #[ignore = "a part of other tests"]
 fn serve_for_another_process() {
-    let Some(file) = std::env::var_os(STUDY) else { return };
-    let study = Arc::new(Study::open(file).unwrap());
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
-    runtime.block_on(async {
-        let server =
-            StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &Exposure::default()).await.unwrap();
-        let server = server.admitting_simulated();
-        println!("\nserving http://{}", server.address());
-        server.run(std::future::pending()).await.unwrap();
-    });
+    let Some(of) = std::env::var_os(STUDY).map(PathBuf::from) else { return };
+    let server = if of.is_dir() {
+        Running::explorer(explore::setup_of(&of))
+    } else {
+        Running::start(Arc::new(Study::open(of).unwrap()))
+    };
+    println!("\nserving {}", server.address);
+    loop {
+        std::thread::park();
+    }
 }
 
-/// Not a test: an explorer, likewise.
-#[test]
-#[ignore = "a part of other tests"]
-fn explore_for_another_process() {
-    let Some(dir) = std::env::var_os(STUDY).map(std::path::PathBuf::from) else { return };
-    let pictures = [100, 400, 1600].map(|spp| dir.join(format!("wall/{spp:05}.png"))).to_vec();
-    let setup = ExploreSetup { pictures, tile: 64, ..ExploreSetup::new(dir.join("explore.sqlite")) };
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
-    runtime.block_on(async {
-        let server =
-            ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &Exposure::default()).await.unwrap();
-        println!("\nserving http://{}", server.address());
-        server.run(std::future::pending()).await.unwrap();
-    });
-}
-
-/// The server in a process of its own, and its address.
-pub(crate) fn process(folder: &Folder) -> (std::process::Child, String) {
-    start("kill::serve_for_another_process", &folder.file)
-}
-
-/// This program again, as one of the servers above, and its address.
-pub(crate) fn start(what: &str, of: &std::path::Path) -> (std::process::Child, String) {
+/// This program again, as the server of a study file or an explorer of a folder.
+pub(crate) fn process(of: &Path) -> (std::process::Child, Running) {
     let mut child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", what, "--ignored", "--nocapture"])
+        .args(["--exact", "kill::serve_for_another_process", "--ignored", "--nocapture"])
         .env(STUDY, of)
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
-    let url = lines.find_map(|line| line.strip_prefix("serving ").map(str::to_owned));
+    let address = lines.find_map(|line| line.strip_prefix("serving ").map(|at| at.parse().unwrap()));
     // The test harness of the child says more after a minute, and ends if nobody listens
     std::thread::spawn(move || lines.for_each(drop));
-    (child, url.unwrap())
+    (child, Running::elsewhere(address.unwrap()))
 }
 
+/// Killed (SIGKILL) while eight observers click, five times: every event that was acknowledged is there
+/// afterwards, each once and in order, and at most one more a session, which was on its way.
 #[test]
 fn a_killed_server_has_lost_nothing() {
-    kill_servers(5);
-}
-
-/// `cargo test -p noisefloor-study --test it -- --ignored --nocapture a_hundred`
-#[test]
-#[ignore = "takes minutes"]
-fn a_hundred_killed_servers_have_lost_nothing() {
-    kill_servers(100);
-}
-
-/// Killed (SIGKILL) while eight observers click, a number of times: every event that was acknowledged is
-/// there afterwards, each once and in order, and at most one more a session, which was on its way.
-fn kill_servers(kills: u64) {
     let folder = Folder::new("acquisition", &["wall", "door"], &levels(40, 1.15), "");
     let study = folder.study();
     let mut acknowledged_in_all = 0;
-    for round in 0..kills {
-        let (mut child, url) = process(&folder);
+    for round in 0..5 {
+        let (mut child, server) = process(&folder.file);
         let before: usize =
             store::read_all(&study.database, &study.design()).unwrap().iter().map(|r| r.events.len()).sum();
         let counts: Vec<AtomicU64> = (0..8).map(|_| AtomicU64::new(0)).collect();
         std::thread::scope(|scope| {
             for (i, count) in counts.iter().enumerate() {
-                let url = &url;
+                let url = &server.url;
                 scope.spawn(move || {
                     let mut observer = public(2, &[500.0, 2000.0]).draw(100 * round + i as u64);
                     let counted = |_| {
@@ -123,5 +91,4 @@ fn kill_servers(kills: u64) {
         acknowledged_in_all += acknowledged;
     }
     assert!(acknowledged_in_all > 100, "killed before anything happened: {acknowledged_in_all}");
-    println!("{acknowledged_in_all} events acknowledged in {kills} rounds, none lost");
 }

@@ -1,17 +1,20 @@
 use noisefloor_image::write_png;
 use noisefloor_pages::http::Exposure;
 use noisefloor_study::explore::{ExploreServer, ExploreSetup};
-use noisefloor_study::simulated::{Public, SpreadShape};
+use noisefloor_study::simulated::Public;
 use noisefloor_study::{Study, StudyServer};
 use noisefloor_testkit::HANG;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 use tempfile::TempDir;
 use tokio::sync::oneshot;
+
+const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 0);
+pub(crate) const JSON: &str = "content-type: application/json\r\n";
 
 /// A running mean of `spp` samples of a picture with texture: noise of variance 0.1/spp, uniform, from
 /// fixed seeds.
@@ -99,15 +102,18 @@ impl Folder {
     }
 }
 
-/// A server in a thread of its own, until it is dropped.
+/// A server in a thread of its own until it is dropped, or one that another process runs.
 pub(crate) struct Running {
     pub(crate) address: SocketAddr,
     pub(crate) url: String,
-    /// Path of the experimenter's page, with its key.
+    /// Path of the experimenter's page of a study, with its key.
     pub(crate) experimenter: String,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
+
+/// Takes the address of a server once it is bound, and says when it stops.
+type Life = (mpsc::Sender<(SocketAddr, String)>, oneshot::Receiver<()>);
 
 impl Running {
     pub(crate) fn start(study: Arc<Study>) -> Self {
@@ -124,135 +130,110 @@ impl Running {
     }
 
     fn serving(study: Arc<Study>, exposure: Exposure, set_up: fn(StudyServer) -> StudyServer) -> Self {
-        let (stop, stopped) = oneshot::channel::<()>();
-        let (tell, told) = std::sync::mpsc::channel();
+        Self::living(async move |(tell, stopped)| {
+            let server = set_up(StudyServer::bind(study, LOCAL.into(), &exposure).await.unwrap());
+            tell.send((server.address(), server.experimenter_path())).unwrap();
+            server.run(async { drop(stopped.await) }).await.unwrap();
+        })
+    }
+
+    pub(crate) fn explorer(setup: ExploreSetup) -> Self {
+        Self::living(async move |(tell, stopped)| {
+            let server = ExploreServer::bind(setup, LOCAL.into(), &Exposure::default()).await.unwrap();
+            tell.send((server.address(), String::new())).unwrap();
+            server.run(async { drop(stopped.await) }).await.unwrap();
+        })
+    }
+
+    fn living(serve: impl AsyncFnOnce(Life) + Send + 'static) -> Self {
+        let (stop, stopped) = oneshot::channel();
+        let (tell, told) = mpsc::channel();
         let thread = std::thread::spawn(move || {
             let runtime =
                 tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
-            runtime.block_on(async {
-                let server = StudyServer::bind(study, ([127, 0, 0, 1], 0).into(), &exposure).await.unwrap();
-                let server = set_up(server);
-                tell.send((server.address(), server.experimenter_path())).unwrap();
-                server.run(async { drop(stopped.await) }).await.unwrap();
-            });
+            runtime.block_on(serve((tell, stopped)));
         });
         let (address, experimenter) = told.recv().unwrap();
         let url = format!("http://{address}");
         Self { address, url, experimenter, stop: Some(stop), thread: Some(thread) }
+    }
+
+    /// One that listens there.
+    pub(crate) fn elsewhere(address: SocketAddr) -> Self {
+        let (url, experimenter) = (format!("http://{address}"), String::new());
+        Self { address, url, experimenter, stop: None, thread: None }
+    }
+
+    /// Sends bytes as they are; what comes until the server closes.
+    pub(crate) fn exchange(&self, bytes: &[u8]) -> Vec<u8> {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(HANG)).unwrap();
+        // The server may answer and close before it has read everything
+        drop(stream.write_all(bytes));
+        let mut said = Vec::new();
+        drop(stream.read_to_end(&mut said));
+        said
+    }
+
+    /// Sends a request with these headers; status, headers in lower case, body.
+    pub(crate) fn raw(&self, method: &str, path: &str, headers: &str, body: &[u8]) -> (u16, String, Vec<u8>) {
+        let mut head = format!("{method} {path} HTTP/1.1\r\nconnection: close\r\n{headers}");
+        if !headers.contains("host:") {
+            head += &format!("host: {}\r\n", self.address);
+        }
+        if !headers.contains("content-length") {
+            head += &format!("content-length: {}\r\n", body.len());
+        }
+        let bytes = self.exchange(&[head.as_bytes(), b"\r\n", body].concat());
+        let end = bytes.windows(4).position(|w| w == b"\r\n\r\n").unwrap_or(bytes.len());
+        let head = String::from_utf8_lossy(&bytes[..end]).to_lowercase();
+        let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).unwrap_or(0);
+        (status, head, bytes.get(end + 4..).unwrap_or_default().to_vec())
+    }
+
+    /// Status and JSON of the answer to a request.
+    pub(crate) fn ask(&self, method: &str, path: &str, headers: &str, body: &[u8]) -> (u16, Value) {
+        let (status, _, body) = self.raw(method, path, headers, body);
+        (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
+    }
+
+    pub(crate) fn get(&self, path: &str) -> Value {
+        let (status, value) = self.ask("GET", path, "", b"");
+        assert_eq!(status, 200, "{path}: {value}");
+        value
+    }
+
+    pub(crate) fn post(&self, path: &str, body: &Value) -> (u16, Value) {
+        self.ask("POST", path, JSON, body.to_string().as_bytes())
+    }
+
+    pub(crate) fn put(&self, path: &str, body: &Value) -> (u16, Value) {
+        self.ask("PUT", path, JSON, body.to_string().as_bytes())
+    }
+
+    pub(crate) fn delete(&self, path: &str) -> (u16, Value) {
+        self.ask("DELETE", path, "", b"")
     }
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
         drop(self.stop.take());
-        if let Some(thread) = self.thread.take() {
-            drop(thread.join());
-        }
+        drop(self.thread.take().map(JoinHandle::join));
     }
+}
+
+/// A refusal says what, where and what to do, and names no path of the machine.
+pub(crate) fn refused((status, said): (u16, Value), expected: u16) {
+    assert_eq!(status, expected, "{said}");
+    for part in ["what", "where", "what_to_do"] {
+        assert!(said[part].as_str().is_some_and(|s| s.len() > 1), "{part}: {said}");
+    }
+    assert!(!said.to_string().contains("/tmp"), "paths of the machine: {said}");
 }
 
 /// Observers whose median stops seeing noise at these thresholds, the same in each stack.
 pub(crate) fn public(stacks: usize, thresholds: &[f64]) -> Public {
-    Public {
-        thresholds: vec![thresholds.to_vec(); stacks],
-        shape: SpreadShape::Logistic,
-        between: 0.3,
-        by_place: 0.0,
-        within: 0.1,
-        lapse: 0.01,
-        bias: 0.0,
-    }
-}
-
-/// An explorer in a thread of its own, or wherever it listens.
-pub(crate) struct Served {
-    pub(crate) address: SocketAddr,
-    stop: Option<oneshot::Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Served {
-    pub(crate) fn explorer(setup: ExploreSetup) -> Self {
-        let (stop, stopped) = oneshot::channel::<()>();
-        let (tell, told) = std::sync::mpsc::channel();
-        let thread = std::thread::spawn(move || {
-            let runtime =
-                tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
-            runtime.block_on(async {
-                let server = ExploreServer::bind(setup, ([127, 0, 0, 1], 0).into(), &Exposure::default())
-                    .await
-                    .unwrap();
-                tell.send(server.address()).unwrap();
-                server.run(async { drop(stopped.await) }).await.unwrap();
-            });
-        });
-        Self { address: told.recv().unwrap(), stop: Some(stop), thread: Some(thread) }
-    }
-
-    /// Sends bytes with these headers; status, headers in lower case, body.
-    pub(crate) fn raw(&self, method: &str, path: &str, headers: &str, body: &[u8]) -> (u16, String, Vec<u8>) {
-        let host =
-            if headers.contains("host:") { String::new() } else { format!("host: {}\r\n", self.address) };
-        let length = if headers.contains("content-length") {
-            String::new()
-        } else {
-            format!("content-length: {}\r\n", body.len())
-        };
-        let head = format!("{method} {path} HTTP/1.1\r\n{host}connection: close\r\n{length}{headers}\r\n");
-        let mut stream = TcpStream::connect(self.address).unwrap();
-        stream.set_read_timeout(Some(HANG)).unwrap();
-        // The server may answer and close before it has read everything
-        drop(stream.write_all(&[head.as_bytes(), body].concat()));
-        let mut bytes = Vec::new();
-        drop(stream.read_to_end(&mut bytes));
-        let end = bytes.windows(4).position(|w| w == b"\r\n\r\n").unwrap_or(bytes.len());
-        let head = String::from_utf8_lossy(&bytes[..end]).to_lowercase();
-        let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).unwrap_or(0);
-        let body = bytes.get(end + 4..).unwrap_or_default().to_vec();
-        (status, head, body)
-    }
-
-    fn json(&self, method: &str, path: &str, body: &str) -> (u16, Value) {
-        let (status, _, body) = self.raw(method, path, "content-type: application/json\r\n", body.as_bytes());
-        (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
-    }
-
-    pub(crate) fn get(&self, path: &str) -> Value {
-        let (status, value) = self.json("GET", path, "");
-        assert_eq!(status, 200, "{path}: {value}");
-        value
-    }
-
-    pub(crate) fn post(&self, path: &str, body: &Value) -> (u16, Value) {
-        self.json("POST", path, &body.to_string())
-    }
-
-    pub(crate) fn put(&self, path: &str, body: &Value) -> (u16, Value) {
-        self.json("PUT", path, &body.to_string())
-    }
-
-    pub(crate) fn delete(&self, path: &str) -> (u16, Value) {
-        self.json("DELETE", path, "")
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        drop(self.stop.take());
-        if let Some(thread) = self.thread.take() {
-            drop(thread.join());
-        }
-    }
-}
-
-/// An explorer in a process of its own, to be killed.
-pub(crate) struct Picturing;
-
-impl Picturing {
-    /// Of the pictures in `dir`/wall, with `dir`/explore.sqlite.
-    pub(crate) fn process(dir: &Path) -> (std::process::Child, Served) {
-        let (child, url) = crate::kill::start("kill::explore_for_another_process", dir);
-        let address = url.strip_prefix("http://").unwrap().parse().unwrap();
-        (child, Served { address, stop: None, thread: None })
-    }
+    let thresholds = vec![thresholds.to_vec(); stacks];
+    Public { between: 0.3, within: 0.1, lapse: 0.01, ..Public::of(thresholds) }
 }

@@ -2,8 +2,8 @@ use crate::kit::{Folder, Running, film, levels, stack};
 use noisefloor_image::{RenderLayers, write_exr, write_png};
 use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse};
-use noisefloor_study::simulated::{Public, SpreadShape, drive};
-use noisefloor_study::{Study, StudyError};
+use noisefloor_study::simulated::{Public, drive};
+use noisefloor_study::{FileFault, Study, StudyError};
 use std::fs;
 
 /// What is wrong with a study is said, and where.
@@ -31,7 +31,8 @@ fn malformed_studies_are_refused() {
     }
     fs::write(&folder.file, "x = 1\n".repeat(1 << 18)).unwrap();
     assert!(Study::open(&folder.file).unwrap_err().to_string().contains("longer"));
-    assert!(matches!(Study::open("/nonexistent/study.toml"), Err(StudyError::Io { .. })));
+    let absent = Study::open("/nonexistent/study.toml");
+    assert!(matches!(absent, Err(StudyError::File { fault: FileFault::Io(_), .. })));
 }
 
 #[test]
@@ -40,7 +41,10 @@ fn broken_pictures_are_found_before_anyone_looks() {
     folder.study().check_pictures().unwrap();
     let path = folder.dir.path().join("wall/00020.png");
     write_png(&path, 16, 16, &[0; 768]).unwrap();
-    assert!(matches!(folder.study().check_pictures(), Err(StudyError::Size { .. })));
+    assert!(matches!(
+        folder.study().check_pictures(),
+        Err(StudyError::File { fault: FileFault::Size { .. }, .. })
+    ));
     fs::write(&path, b"no picture").unwrap();
     assert!(matches!(folder.study().check_pictures(), Err(StudyError::Picture(_))));
     fs::remove_file(&path).unwrap();
@@ -69,7 +73,10 @@ fn linear_stacks_share_one_exposure() {
     assert_eq!(shown(2), 109);
     fs::write(dir.join("20.exr"), fs::read(dir.join("10.exr")).unwrap()).unwrap();
     write_exr(dir.join("10.exr"), &RenderLayers::rgb(64, 32, &vec![[f32::NAN; 3]; 64 * 32])).unwrap();
-    assert!(matches!(folder.study().check_pictures(), Err(StudyError::NotFinite { .. })));
+    assert!(matches!(
+        folder.study().check_pictures(),
+        Err(StudyError::File { fault: FileFault::NotFinite, .. })
+    ));
 }
 
 /// Tiles are the picture, cut: put together again, every byte is there.
@@ -148,7 +155,10 @@ fn a_stack_may_be_a_loop_of_frames() {
     refused("whose levels are not those of");
     fs::rename(dir.join("0003/00021.png"), dir.join("0003/00020.png")).unwrap();
     stack(&dir.join("0002"), (32, 32), &[20]);
-    assert!(matches!(folder.study().check_pictures(), Err(StudyError::Size { .. })));
+    assert!(matches!(
+        folder.study().check_pictures(),
+        Err(StudyError::File { fault: FileFault::Size { .. }, .. })
+    ));
 }
 
 /// Simulated observers of a still and of a loop with lower thresholds: the analysis finds both, and the
@@ -164,15 +174,8 @@ fn thresholds_of_loops_are_found_and_kept_out_of_the_corpus() {
     fs::write(&folder.file, text).unwrap();
     let study = folder.study();
     let server = Running::start(study.clone());
-    let public = Public {
-        thresholds: vec![vec![400.0, 500.0], vec![150.0, 200.0]],
-        shape: SpreadShape::Logistic,
-        between: 0.25,
-        by_place: 0.0,
-        within: 0.1,
-        lapse: 0.0,
-        bias: 0.0,
-    };
+    let thresholds = vec![vec![400.0, 500.0], vec![150.0, 200.0]];
+    let public = Public { between: 0.25, within: 0.1, ..Public::of(thresholds) };
     for seed in 0..12 {
         drive(&server.url, "", &mut public.draw(seed), |_| ()).unwrap();
     }
