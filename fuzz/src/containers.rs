@@ -1,23 +1,15 @@
 //! Models and checkpoints: the bytes are the payload, of a checkpoint after its length and before the film; magic,
 //! version, lengths and checksums are right.
 
+use crate::files::{HEADER, content, framed};
 use noisefloor::{Checkpoint, FixedSpp, Model, Params, Session};
 
-/// Magic and version.
-const HEAD: usize = 12;
-/// Magic, version, length and checksum.
-const HEADER: usize = HEAD + 8 + 32;
 /// What the checkpoints belong to.
 const JOB: &str = "a job";
 
-fn wrap(head: &[u8], payload: &[u8]) -> Vec<u8> {
-    let length = (payload.len() as u64).to_le_bytes();
-    [&head[..HEAD], &length, blake3::hash(payload).as_bytes(), payload].concat()
-}
-
 pub(crate) fn model(payload: &[u8]) -> bool {
     thread_local!(static HEAD: Vec<u8> = small_model());
-    let Ok(model) = HEAD.with(|head| Model::read(wrap(head, payload).as_slice())) else { return false };
+    let Ok(model) = HEAD.with(|head| Model::read(framed(head, payload).as_slice())) else { return false };
     // What can be read can be used, and written so that it reads back
     let mut again = Vec::new();
     model.write(&mut again).expect("a model that was read can be written");
@@ -44,7 +36,7 @@ pub(crate) fn checkpoint(bytes: &[u8]) -> bool {
     thread_local!(static HEAD: Vec<u8> = kept(&session()));
     let Some((length, rest)) = bytes.split_first_chunk() else { return false };
     let (payload, film) = rest.split_at(usize::from(u16::from_le_bytes(*length)).min(rest.len()));
-    let whole = HEAD.with(|head| [&wrap(head, payload), film, blake3::hash(film).as_bytes()].concat());
+    let whole = HEAD.with(|head| [&framed(head, payload), film, blake3::hash(film).as_bytes()].concat());
     let Ok(checkpoint) = Checkpoint::read(whole.as_slice()) else { return false };
     let Ok(mut session) = fresh().resume(JOB, checkpoint) else { return false };
     // A session that resumes can go on
@@ -60,10 +52,9 @@ pub(crate) fn checkpoint(bytes: &[u8]) -> bool {
 
 pub(crate) fn checkpoint_seeds() -> Vec<Vec<u8>> {
     let seed = |whole: Vec<u8>| {
-        let length: [u8; 8] = whole[HEAD..HEAD + 8].try_into().expect("eight bytes");
-        let payload = u64::from_le_bytes(length) as usize;
-        let film = &whole[HEADER + payload..whole.len() - 32];
-        [&(payload as u16).to_le_bytes(), &whole[HEADER..HEADER + payload], film].concat()
+        let payload = content(&whole);
+        let film = &whole[HEADER + payload.len()..whole.len() - 32];
+        [&(payload.len() as u16).to_le_bytes(), payload, film].concat()
     };
     vec![seed(kept(&fresh())), seed(kept(&session()))]
 }

@@ -1,23 +1,11 @@
 //! Shards of a farm: the bytes are the header; magic, version, length and checksum are right, and samples follow.
 
-use crate::files::Folder;
+use crate::files::{Folder, HEADER, content, framed};
 use noisefloor::{FixedSpp, Params, Session, source::SourceIdentity};
 use noisefloor_farm::{PlannedBatch, Shard, ShardJob, ShardSet};
 
-/// Magic and version.
-const HEAD: usize = 12;
-/// Magic, version, length and checksum.
-const PREFIX: usize = HEAD + 8 + 32;
-
 fn wrap(whole: &[u8], header: &[u8]) -> Vec<u8> {
-    let length = (header.len() as u64).to_le_bytes();
-    let samples = &whole[PREFIX + header_of(whole).len()..];
-    [&whole[..HEAD], &length, blake3::hash(header).as_bytes(), header, samples].concat()
-}
-
-fn header_of(whole: &[u8]) -> &[u8] {
-    let length = u64::from_le_bytes(whole[HEAD..HEAD + 8].try_into().expect("eight bytes"));
-    &whole[PREFIX..][..length as usize]
+    [&framed(whole, header), &whole[HEADER + content(whole).len()..]].concat()
 }
 
 pub(crate) fn shard(header: &[u8]) -> bool {
@@ -34,7 +22,7 @@ fn merge(folder: &Folder, bytes: &[u8]) -> u64 {
 }
 
 pub(crate) fn shard_seeds() -> Vec<Vec<u8>> {
-    vec![header_of(&written()).to_vec()]
+    vec![content(&written()).to_vec()]
 }
 
 fn session() -> Session<FixedSpp> {
@@ -67,7 +55,7 @@ mod tests {
     #[test]
     fn seeds_are_merged() {
         let whole = written();
-        let again = wrap(&whole, header_of(&whole));
+        let again = wrap(&whole, content(&whole));
         let planned: u64 = PlannedBatch::ahead(&session()).iter().map(|b| b.spp).sum();
         // Two tiles of 32 and of 16 by 32 pixels, with as many samples per pixel
         assert_eq!(merge(&Folder::new(), &again), planned / 2 * 48 * 32);

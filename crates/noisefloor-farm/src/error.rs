@@ -7,7 +7,7 @@ use noisefloor::{
 use noisefloor_image::WriteError;
 use std::error::Error;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Version of the format of shards.
@@ -63,30 +63,10 @@ pub type StudioError = Box<dyn Error + Send + Sync>;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FarmError {
-    #[error("{}: cannot be read: {source}", path.display())]
-    Read { path: PathBuf, source: io::Error },
-    #[error("{}: is not what a farm writes: {source}; plan the farm anew in another folder", path.display())]
-    Json { path: PathBuf, source: serde_json::Error },
+    #[error("{}: {fault}", path.display())]
+    Path { path: PathBuf, fault: PathFault },
     #[error(transparent)]
     Write(#[from] WriteError),
-    #[error(
-        "{}: has format version {found}, and this release reads version {PLAN_VERSION}; \
-         finish it with the release that planned it, or plan the farm anew in another folder",
-        path.display()
-    )]
-    Version { path: PathBuf, found: u64 },
-    /// The folder is not a farm's, or already one.
-    #[error("{}: {what}", path.display())]
-    Folder {
-        path: PathBuf,
-        /// What is wrong, and what to do.
-        what: String,
-    },
-    #[error(
-        "{}: another noisefloor plans or merges in this folder; wait for it, or see `noisefloor farm status`",
-        .0.display()
-    )]
-    Locked(PathBuf),
     #[error(
         "{0} cannot be rendered on a farm: it does not promise that the same seed repeats its samples; \
          `noisefloor render` renders it on one machine"
@@ -118,47 +98,14 @@ pub enum FarmError {
         /// What it did, and what to do.
         what: String,
     },
-    #[error(
-        "{}: round {number} is under way as Slurm jobs {} and {} ({left} left); \
-         `noisefloor farm status` shows how far it is, `scancel {} {}` ends it",
-        path.display(), tasks, step, tasks, step
-    )]
-    UnderWay {
-        path: PathBuf,
-        number: usize,
-        /// Slurm's number of its tasks.
-        tasks: String,
-        /// Slurm's number of the job that merges them.
-        step: String,
-        left: usize,
-    },
-    #[error(
-        "{}: {rounds} rounds in a row brought no samples; see {}, mend what is wrong, and run again",
-        path.display(), log.display()
-    )]
-    Barren {
-        path: PathBuf,
-        rounds: usize,
-        /// What the first task of the last one said.
-        log: PathBuf,
-    },
     #[error("round {number} has been superseded by round {now}: nothing to do")]
     Superseded { number: usize, now: usize },
-    #[error("{}: round {number} has no task {task} (any more): nothing to do", path.display())]
-    NoTask { path: PathBuf, number: usize, task: usize },
-    #[error(
-        "{}: holds a picture of another job than the farm's; move it away, or plan the farm in another folder",
-        .0.display()
-    )]
-    OtherPicture(PathBuf),
     #[error(
         "this model needs a reference, which a farm does not render; use a model trained on half buffers"
     )]
     Reference,
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    #[error("{}: does not say which render it is of: {source}; render it again", path.display())]
-    Unknown { path: PathBuf, source: serde_json::Error },
     #[error("none of these files is a shard; {}: {source}", path.display())]
     NoShard { path: PathBuf, source: ShardError },
     #[error(transparent)]
@@ -167,7 +114,69 @@ pub enum FarmError {
     Frame { name: String, source: Box<Self> },
 }
 
+/// What is wrong with a file or folder of a farm.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PathFault {
+    #[error("cannot be read: {0}")]
+    Read(#[from] io::Error),
+    #[error("is not what a farm writes: {0}; plan the farm anew in another folder")]
+    Json(#[from] serde_json::Error),
+    #[error(
+        "has format version {0}, and this release reads version {PLAN_VERSION}; \
+         finish it with the release that planned it, or plan the farm anew in another folder"
+    )]
+    Version(u64),
+    /// The folder is not a farm's, or already one. What is wrong, and what to do.
+    #[error("{0}")]
+    Folder(String),
+    #[error(
+        "another noisefloor plans or merges in this folder; wait for it, or see `noisefloor farm status`"
+    )]
+    Locked,
+    #[error(
+        "round {number} is under way as Slurm jobs {tasks} and {step} ({left} left); \
+         `noisefloor farm status` shows how far it is, `scancel {tasks} {step}` ends it"
+    )]
+    UnderWay {
+        number: usize,
+        /// Slurm's number of its tasks.
+        tasks: String,
+        /// Slurm's number of the job that merges them.
+        step: String,
+        left: usize,
+    },
+    #[error(
+        "{rounds} rounds in a row brought no samples; see {}, mend what is wrong, and run again",
+        log.display()
+    )]
+    Barren {
+        rounds: usize,
+        /// What the first task of the last one said.
+        log: PathBuf,
+    },
+    #[error("round {number} has no task {task} (any more): nothing to do")]
+    NoTask { number: usize, task: usize },
+    #[error(
+        "holds a picture of another job than the farm's; move it away, or plan the farm in another folder"
+    )]
+    OtherPicture,
+    #[error("does not say which render it is of: {0}; render it again")]
+    Unknown(#[source] serde_json::Error),
+}
+
+impl From<String> for PathFault {
+    fn from(what: String) -> Self {
+        Self::Folder(what)
+    }
+}
+
 impl FarmError {
+    /// A fault of what is at `path`.
+    pub(crate) fn at(path: &Path, fault: impl Into<PathFault>) -> Self {
+        Self::Path { path: path.to_owned(), fault: fault.into() }
+    }
+
     /// Says which frame it is about.
     pub(crate) fn of(name: &str) -> impl FnOnce(Self) -> Self {
         move |error| Self::Frame { name: name.to_owned(), source: Box::new(error) }

@@ -1,7 +1,7 @@
 //! A farm: planned once, then rounds of tasks and merges until every frame is done.
 
 use crate::batch::PlannedBatch;
-use crate::error::FarmError;
+use crate::error::{FarmError, PathFault};
 use crate::folder::{FarmFolder, FarmLock};
 use crate::frame::{Frame, Pictures};
 use crate::local::run_local;
@@ -95,7 +95,7 @@ impl<'a, S: Studio> Farm<'a, S> {
         if folder.planned::<S::Job>()?.is_some() {
             let what =
                 "a farm was planned here already; leave out what follows `--`, or choose another folder";
-            return Err(FarmError::Folder { path: dir.to_owned(), what: what.into() });
+            return Err(FarmError::at(dir, what.to_owned()));
         }
         let _lock = folder.lock()?;
         let farm = Self { studio, folder, plan };
@@ -186,7 +186,7 @@ impl<'a, S: Studio> Farm<'a, S> {
         let names = self.plan.names();
         let wanted = round.tasks.into_iter().nth(task).filter(|_| round.number == number);
         let wanted = wanted.and_then(|wanted| Some((names.get(wanted.frame)?.clone(), wanted)));
-        let no_task = || FarmError::NoTask { path: self.folder.path().to_owned(), number, task };
+        let no_task = || FarmError::at(self.folder.path(), PathFault::NoTask { number, task });
         let (name, wanted) = wanted.ok_or_else(no_task)?;
         Ok(Order {
             folder: &self.folder,
@@ -264,7 +264,7 @@ impl<'a, S: Studio> Farm<'a, S> {
         match round.barren {
             Some(rounds) if rounds >= MOST_BARREN => {
                 let log = self.folder.log(round.number.saturating_sub(1), 0);
-                Err(FarmError::Barren { path: self.folder.path().to_owned(), rounds, log })
+                Err(FarmError::at(self.folder.path(), PathFault::Barren { rounds, log }))
             }
             _ => Ok(()),
         }
@@ -284,8 +284,8 @@ impl<J: Serialize> Order<'_, J> {
         let FrameJob { scene, source: renderer, shards, .. } = self.frame;
         let shard: Shard = sample(source, shards, &self.task.batches, cancel)?;
         if shard.is_empty() {
-            let what = "stopped before the first batch was there".into();
-            return Err(FarmError::Folder { path: self.folder.path().to_owned(), what });
+            let what = "stopped before the first batch was there".to_owned();
+            return Err(FarmError::at(self.folder.path(), what));
         }
         let shard = shard.with_render(&self.job).with_names(scene, renderer);
         shard.write(self.shard)?;
@@ -352,8 +352,8 @@ impl<S: Studio> Coordinator<'_, S> {
         match Slurm::left(&jobs) {
             Ok(0) => {}
             Ok(left) => {
-                let path = self.farm.folder.path().to_owned();
-                return Err(FarmError::UnderWay { path, number, tasks: jobs.tasks, step: jobs.step, left });
+                let fault = PathFault::UnderWay { number, tasks: jobs.tasks, step: jobs.step, left };
+                return Err(FarmError::at(self.farm.folder.path(), fault));
             }
             Err(error) => self.farm.studio.tell(News::Unsure(number, &error)),
         }
@@ -433,7 +433,7 @@ impl<S: Studio> Coordinator<'_, S> {
         let mut tries = 0;
         let _lock = loop {
             match farm.folder.lock() {
-                Err(FarmError::Locked(_)) if tries < LOCK_TRIES => {
+                Err(FarmError::Path { fault: PathFault::Locked, .. }) if tries < LOCK_TRIES => {
                     tries += 1;
                     std::thread::sleep(Duration::from_secs(1));
                 }

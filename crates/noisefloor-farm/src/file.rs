@@ -21,7 +21,7 @@ pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
 
 /// What a file holds; none if there is no such file.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, FarmError> {
-    let failed = |source| FarmError::Read { path: path.to_owned(), source };
+    let failed = |fault: io::Error| FarmError::at(path, fault);
     let file = match open_regular(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -29,8 +29,7 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, F
     };
     let mut text = Vec::new();
     file.take(MAX_JSON).read_to_end(&mut text).map_err(failed)?;
-    let content = serde_json::from_slice(&text);
-    content.map(Some).map_err(|source| FarmError::Json { path: path.to_owned(), source })
+    serde_json::from_slice(&text).map(Some).map_err(|fault| FarmError::at(path, fault))
 }
 
 pub(crate) fn write_json<T: Serialize>(path: &Path, content: &T) -> Result<(), FarmError> {

@@ -10,13 +10,14 @@
 //!     FRAME/…                 the files of `noisefloor render`
 //! ```
 
-use crate::error::{FarmError, PLAN_VERSION};
+use crate::error::{FarmError, PLAN_VERSION, PathFault};
 use crate::file::{read_json, write_json};
 use crate::shard::ShardFile;
 use crate::state::{FarmPlan, FrameJob, FrameState, Round};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// An empty hidden file. The lock itself ends with the process that holds it, however that ends.
@@ -52,12 +53,12 @@ impl FarmFolder {
     /// coordinator that was killed holds no lock.
     pub fn lock(&self) -> Result<FarmLock, FarmError> {
         let path = self.0.join(LOCK);
-        let failed = |source| FarmError::Read { path: path.clone(), source };
+        let failed = |fault: io::Error| FarmError::at(&path, fault);
         fs::create_dir_all(self.0.join("log")).map_err(failed)?;
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(failed)?;
         match file.try_lock() {
             Ok(()) => Ok(FarmLock(file)),
-            Err(TryLockError::WouldBlock) => Err(FarmError::Locked(self.0.clone())),
+            Err(TryLockError::WouldBlock) => Err(FarmError::at(&self.0, PathFault::Locked)),
             Err(TryLockError::Error(error)) => Err(failed(error)),
         }
     }
@@ -68,16 +69,14 @@ impl FarmFolder {
         let Some(plan) = read_json::<Value>(&path)? else { return Ok(None) };
         // What is no plan at all is said by what it lacks
         match plan.as_object().map(|plan| plan.get("version").and_then(Value::as_u64).unwrap_or(1)) {
-            Some(found) if found != PLAN_VERSION => Err(FarmError::Version { path, found }),
-            _ => serde_json::from_value(plan).map(Some).map_err(|source| FarmError::Json { path, source }),
+            Some(found) if found != PLAN_VERSION => Err(FarmError::at(&path, PathFault::Version(found))),
+            _ => serde_json::from_value(plan).map(Some).map_err(|fault| FarmError::at(&path, fault)),
         }
     }
 
     pub fn plan<J: DeserializeOwned>(&self) -> Result<FarmPlan<J>, FarmError> {
-        self.planned()?.ok_or_else(|| FarmError::Folder {
-            path: self.0.clone(),
-            what: "no farm was planned in this folder; `noisefloor farm plan DIR -- SCENE` does".into(),
-        })
+        let what = "no farm was planned in this folder; `noisefloor farm plan DIR -- SCENE` does";
+        self.planned()?.ok_or_else(|| FarmError::at(&self.0, what.to_owned()))
     }
 
     pub fn write_plan<J: Serialize>(&self, plan: &FarmPlan<J>) -> Result<(), FarmError> {
@@ -99,14 +98,14 @@ impl FarmFolder {
 
     pub fn frame_job(&self, name: &str) -> Result<FrameJob, FarmError> {
         let path = self.frame(name).join("frame.json");
-        let what = "is missing: the frame was not planned; plan the farm anew in another folder".into();
-        read_json(&path)?.ok_or(FarmError::Folder { path, what })
+        let what = "is missing: the frame was not planned; plan the farm anew in another folder";
+        read_json(&path)?.ok_or_else(|| FarmError::at(&path, what.to_owned()))
     }
 
     /// Writes what a frame is, and makes its folders.
     pub fn write_frame_job(&self, name: &str, job: &FrameJob) -> Result<(), FarmError> {
         let shards = self.frame(name).join("shards");
-        fs::create_dir_all(&shards).map_err(|source| FarmError::Read { path: shards, source })?;
+        fs::create_dir_all(&shards).map_err(|fault| FarmError::at(&shards, fault))?;
         write_json(&self.frame(name).join("frame.json"), job)
     }
 
@@ -141,7 +140,7 @@ impl FarmFolder {
     /// The shards of a frame, in the order of their names.
     pub fn shards(&self, name: &str) -> Result<Vec<PathBuf>, FarmError> {
         let folder = self.frame(name).join("shards");
-        let failed = |source| FarmError::Read { path: folder.clone(), source };
+        let failed = |fault: io::Error| FarmError::at(&folder, fault);
         let mut shards = Vec::new();
         for entry in fs::read_dir(&folder).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
@@ -157,7 +156,7 @@ impl FarmFolder {
 
     /// Removes a shard that is used up, or puts it into the folder `merged` of its frame.
     pub fn retire(&self, name: &str, shard: &ShardFile, keep: bool) -> Result<(), FarmError> {
-        let failed = |source| FarmError::Read { path: shard.path().to_owned(), source };
+        let failed = |fault: io::Error| FarmError::at(shard.path(), fault);
         if !keep {
             return fs::remove_file(shard.path()).map_err(failed);
         }
@@ -169,8 +168,7 @@ impl FarmFolder {
     /// Puts a shard that cannot be used aside, under the name it returns.
     pub fn set_aside(&self, shard: &Path) -> Result<PathBuf, FarmError> {
         let aside = shard.with_extension("nfs.bad");
-        let failed = |source| FarmError::Read { path: shard.to_owned(), source };
-        fs::rename(shard, &aside).map_err(failed)?;
+        fs::rename(shard, &aside).map_err(|fault| FarmError::at(shard, fault))?;
         Ok(aside)
     }
 }

@@ -1,7 +1,7 @@
 //! One frame: planned, and merged as far as its shards go.
 
 use crate::batch::PlannedBatch;
-use crate::error::FarmError;
+use crate::error::{FarmError, PathFault};
 use crate::folder::FarmFolder;
 use crate::merge::ShardSet;
 use crate::shard::{ShardFile, ShardJob};
@@ -40,7 +40,7 @@ impl<S: Studio> Frame<'_, S> {
                 "holds a render already ({file}), which the farm would overwrite; move it away, \
                  or choose another folder for the farm"
             );
-            return Err(FarmError::Folder { path, what });
+            return Err(FarmError::at(&path, what));
         }
         let FrameSource { source, scene } = self.studio.open(&self.job)?;
         let (info, identity) = (source.info(), source.identity()?);
@@ -97,7 +97,7 @@ impl<S: Studio> Frame<'_, S> {
                 folder.write_state(name, &state)?;
                 return Ok((state, Vec::new()));
             }
-            Finished::Other => return Err(FarmError::OtherPicture(place)),
+            Finished::Other => return Err(FarmError::at(&place, PathFault::OtherPicture)),
             Finished::Not => {}
         }
 
@@ -192,9 +192,9 @@ pub fn merge_shards<S: Studio>(
             None
         }
     });
-    let no_file = || FarmError::Folder { path: out.to_owned(), what: "there are no shards to merge".into() };
+    let no_file = || FarmError::at(out, "there are no shards to merge".to_owned());
     let Some(first) = opened else { return Err(first_error.unwrap_or_else(no_file)) };
-    let unknown = |source| FarmError::Unknown { path: first.path().to_owned(), source };
+    let unknown = |fault| FarmError::at(first.path(), PathFault::Unknown(fault));
     let job: S::Job = first.render().map_err(unknown)?;
     let shards = first.job().clone();
     let mut session = studio.session(&job, (shards.width, shards.height))?;

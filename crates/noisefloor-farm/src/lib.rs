@@ -58,7 +58,7 @@ mod studio;
 mod task;
 
 pub use batch::PlannedBatch;
-pub use error::{FarmError, ShardError, StudioError};
+pub use error::{FarmError, PathFault, ShardError, StudioError};
 pub use farm::{Coordinator, Delivery, Farm, FarmProgress, FrameProgress, Order};
 pub use folder::{FarmFolder, FarmLock};
 pub use forecast::Forecast;

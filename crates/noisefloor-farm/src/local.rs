@@ -55,7 +55,7 @@ fn start(
     processes: usize,
 ) -> Result<Child, FarmError> {
     let log = folder.log(round, task);
-    let cannot_write = |source| FarmError::Read { path: log.clone(), source };
+    let cannot_write = |fault: std::io::Error| FarmError::at(&log, fault);
     let said = File::create(&log).map_err(cannot_write)?;
     let also = said.try_clone().map_err(cannot_write)?;
     let mut command = Command::new(program);
@@ -91,7 +91,7 @@ mod tests {
         // A folder where the log of the second would be
         std::fs::create_dir_all(folder.log(1, 1)).unwrap();
         let error = run_local(&program, &folder, &round, 2, || false).unwrap_err();
-        assert!(matches!(&error, FarmError::Read { path, .. } if *path == folder.log(1, 1)), "{error}");
+        assert!(matches!(&error, FarmError::Path { path, .. } if *path == folder.log(1, 1)), "{error}");
         assert!(scratch.path().join("ended").exists(), "a task still runs");
     }
 }
