@@ -46,12 +46,6 @@ impl CyclesAdaptive {
     }
 }
 
-impl Default for CyclesAdaptive {
-    fn default() -> Self {
-        Self::new(DEFAULT_THRESHOLD)
-    }
-}
-
 /// Error of one pixel; infinite where a half has no valid sample.
 fn error(film: &Film, exposure: f64, tile: usize, pixel: usize) -> f64 {
     half_difference(film, tile, pixel, exposure).map_or(f64::INFINITY, |(difference, intensity)| {
@@ -177,7 +171,7 @@ mod tests {
     #[test]
     fn an_active_pixel_keeps_its_neighbours() {
         let film = speck(0.5);
-        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::default() };
+        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::new(DEFAULT_THRESHOLD) };
         let verdicts = cycles.judge(&view(&film), &all(&film)).unwrap();
         let active: Vec<usize> = (0..64 * 64).filter(|&p| !cycles.converged[p]).collect();
         let expected: Vec<usize> = (9..12).flat_map(|y| (31..34).map(move |x| y * 64 + x)).collect();
@@ -185,14 +179,14 @@ mod tests {
         assert_eq!(verdicts.iter().map(|v| v.converged).collect::<Vec<_>>(), [false, false, true, true]);
 
         // Where its tile is not looked at, it keeps nobody.
-        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::default() };
+        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::new(DEFAULT_THRESHOLD) };
         assert!(cycles.judge(&view(&film), &[film.grid().tile(0)]).unwrap()[0].converged);
     }
 
     #[test]
     fn what_has_converged_stays_so() {
         let mut film = constant(0.2, 100);
-        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::default() };
+        let mut cycles = CyclesAdaptive { share: 1.0, ..CyclesAdaptive::new(DEFAULT_THRESHOLD) };
         assert!(cycles.judge(&view(&film), &all(&film)).unwrap().iter().all(|v| v.converged));
         for value in [0.1, 0.9] {
             film.add(0, 50, &[[value; 3]; 1024]).unwrap();

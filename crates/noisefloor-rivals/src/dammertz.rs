@@ -70,12 +70,6 @@ impl Dammertz {
     }
 }
 
-impl Default for Dammertz {
-    fn default() -> Self {
-        Self::new(DEFAULT_STOP)
-    }
-}
-
 impl Block {
     fn tiles(&self, grid: TileGrid) -> impl Iterator<Item = usize> {
         let columns = self.columns.clone();

@@ -6,7 +6,6 @@
 //! | criterion | spec | done when |
 //! |---|---|---|
 //! | [`FixedSpp`](noisefloor::FixedSpp) | `spp:256` | a tile has 256 samples per pixel |
-//! | [`TimeLimit`] | `time:30` | 30 seconds have passed |
 //! | [`RelativeError`] | `relative-error:0.17` | a pixel's confidence interval is small (Mitsuba 0.6) |
 //! | [`Dammertz`] | `dammertz:0.0046` | the error of a block is small (Dammertz et al. 2010) |
 //! | [`CyclesAdaptive`] | `cycles:0.01` | the relative error of a pixel is small (Blender) |
@@ -75,7 +74,6 @@ mod stages;
 mod testing;
 #[cfg(test)]
 mod tests;
-mod time;
 mod vdp;
 
 pub use converged::ConvergedCvvdp;
@@ -86,8 +84,7 @@ pub use picture::{DifferenceMap, DisplayPixels, MetricError};
 pub use relative_error::RelativeError;
 pub use spec::{RIVALS, Rival, RivalSpec, SpecError, parse};
 pub use stages::{Myszkowski1998, Takouachet2007};
-pub use time::TimeLimit;
-pub use vdp::{Vdp, VdpViewing, VdpViewingError};
+pub use vdp::Vdp;
 
 #[cfg(doc)]
 use noisefloor::StoppingCriterion;

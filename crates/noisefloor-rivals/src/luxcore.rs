@@ -53,12 +53,6 @@ impl LuxCoreHalt {
     }
 }
 
-impl Default for LuxCoreHalt {
-    fn default() -> Self {
-        Self::new(DEFAULT_SHARE)
-    }
-}
-
 impl StoppingCriterion for LuxCoreHalt {
     fn name(&self) -> String {
         format!("LuxCore, {} of the pixels", self.share)

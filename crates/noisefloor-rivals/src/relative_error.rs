@@ -49,12 +49,6 @@ impl RelativeError {
     }
 }
 
-impl Default for RelativeError {
-    fn default() -> Self {
-        Self::new(DEFAULT_ERROR)
-    }
-}
-
 /// Batches of one pixel so far (West 1979: weighted mean and sum of squares, updated).
 #[derive(Clone, Copy, Debug, Default)]
 struct Batches {

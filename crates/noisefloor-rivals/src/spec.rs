@@ -2,7 +2,7 @@
 
 use crate::{
     ConvergedCvvdp, CyclesAdaptive, Dammertz, LuxCoreHalt, Myszkowski1998, RelativeError, Takouachet2007,
-    TimeLimit, converged, cycles, dammertz, luxcore, relative_error, stages,
+    converged, cycles, dammertz, luxcore, relative_error, stages,
 };
 use noisefloor::{FixedSpp, StoppingCriterion};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -12,8 +12,6 @@ use thiserror::Error;
 
 /// Samples per pixel of the example.
 const DEFAULT_SAMPLES: f64 = 1000.0;
-/// Seconds of `time` without a number.
-const DEFAULT_SECONDS: f64 = 60.0;
 
 /// A criterion with one constant that its authors leave open or to the user.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +42,6 @@ pub struct Rival {
 
 const SHARE: &str = "a share of the pixels above 0 and at most 1";
 const POSITIVE: &str = "a number above 0";
-const SECONDS: &str = "a number of seconds, at least 0";
 const PROBABILITY: &str = "a probability above 0 and below 1";
 
 /// All rivals with one open constant.
@@ -156,34 +153,29 @@ pub enum SpecError {
 }
 
 fn known() -> String {
-    let names = RIVALS.iter().map(|r| r.name).chain(["time"]);
-    names.map(|name| format!("{name}:…")).collect::<Vec<_>>().join(", ")
+    RIVALS.iter().map(|rival| format!("{}:…", rival.name)).collect::<Vec<_>>().join(", ")
 }
 
 /// A criterion by its name, and after a colon its constant, or the default without one; `spp` needs its
-/// number: `"spp:256"`, `"time:30"` (seconds), `"relative-error:0.17"`, `"dammertz:0.0046"`,
+/// number: `"spp:256"`, `"relative-error:0.17"`, `"dammertz:0.0046"`,
 /// `"cycles:0.01"`, `"luxcore:0.31"`, `"vdp-stages:0.94"`, `"vdp-first:0.74"`, `"cvvdp:0.3"`. Checked when
 /// it is parsed; files keep the text.
 #[derive(Clone, Debug)]
 pub struct RivalSpec {
     text: String,
-    /// None for `time`.
-    rival: Option<&'static Rival>,
+    rival: &'static Rival,
     constant: f64,
 }
 
 impl RivalSpec {
     /// A criterion that has not seen anything yet.
     pub fn criterion(&self) -> Box<dyn StoppingCriterion + Send> {
-        match self.rival {
-            Some(rival) => (rival.make)(self.constant),
-            None => Box::new(TimeLimit::new(self.constant)),
-        }
+        (self.rival.make)(self.constant)
     }
 
     /// Whether it compares with the converged picture, which no render has.
     pub fn against_converged(&self) -> bool {
-        self.rival.is_some_and(|rival| rival.against_converged)
+        self.rival.against_converged
     }
 }
 
@@ -193,11 +185,8 @@ impl FromStr for RivalSpec {
     fn from_str(spec: &str) -> Result<Self, SpecError> {
         let (name, number) = spec.split_once(':').map_or((spec, None), |(name, number)| (name, Some(number)));
         let rival = RIVALS.iter().find(|rival| rival.name == name);
-        let (name, default, wanted, valid) = match rival {
-            Some(rival) => (rival.name, rival.default, rival.wanted, rival.valid),
-            None if name == "time" => ("time", DEFAULT_SECONDS, SECONDS, (|s| s >= 0.0) as fn(f64) -> bool),
-            None => return Err(SpecError::Unknown { name: name.into() }),
-        };
+        let rival = rival.ok_or_else(|| SpecError::Unknown { name: name.into() })?;
+        let Rival { name, default, wanted, valid, .. } = *rival;
         // Any default number of samples would be wrong for somebody
         let constant = match number.or((name == "spp").then_some("")) {
             None => Some(default),
@@ -245,7 +234,6 @@ mod tests {
     fn specs_name_criteria() {
         for (spec, name) in [
             ("spp:256", "256 samples per pixel"),
-            ("time:1.5", "1.5 seconds"),
             ("relative-error", "relative error 0.17 at 95 %"),
             ("dammertz:0.002", "Dammertz et al. 2010, stop 0.002"),
             ("cycles: 0.1", "Cycles, threshold 0.1"),
@@ -275,8 +263,7 @@ mod tests {
             "spp:0",
             "spp:x",
             "spp:1e99",
-            "time:-1",
-            "time:NaN",
+            "time:1",
             "luxcore:1.1",
             "vdp-first:1",
             "dammertz:inf",

@@ -95,18 +95,7 @@ pub struct Myszkowski1998 {
 impl Myszkowski1998 {
     /// The criterion with this constant, 1 % of a tile's pixels, and the default viewing condition.
     pub fn new(probability: f64) -> Self {
-        Self::with(probability, Vdp::default())
-    }
-
-    /// The criterion with this constant and predictor.
-    pub fn with(probability: f64, vdp: Vdp) -> Self {
-        Self { probability, share: DEFAULT_SHARE, vdp, stages: Stages::new() }
-    }
-}
-
-impl Default for Myszkowski1998 {
-    fn default() -> Self {
-        Self::new(DEFAULT_SEEN)
+        Self { probability, share: DEFAULT_SHARE, vdp: Vdp::default(), stages: Stages::new() }
     }
 }
 
@@ -159,18 +148,7 @@ pub struct Takouachet2007 {
 impl Takouachet2007 {
     /// The criterion with this constant, 1 % of a tile's pixels, and the default viewing condition.
     pub fn new(probability: f64) -> Self {
-        Self::with(probability, Vdp::default())
-    }
-
-    /// The criterion with this constant and predictor.
-    pub fn with(probability: f64, vdp: Vdp) -> Self {
-        Self { probability, share: DEFAULT_SHARE, vdp, first: None, stages: Stages::new() }
-    }
-}
-
-impl Default for Takouachet2007 {
-    fn default() -> Self {
-        Self::new(DEFAULT_GROWTH)
+        Self { probability, share: DEFAULT_SHARE, vdp: Vdp::default(), first: None, stages: Stages::new() }
     }
 }
 
@@ -243,8 +221,8 @@ mod tests {
     #[test]
     fn a_clean_picture_is_done_once_it_can_be_told() {
         let counts = [100, 200, 300, 400];
-        assert_eq!(run(&mut Myszkowski1998::default(), 0.0, &counts), [false, true, true, true]);
-        assert_eq!(run(&mut Takouachet2007::default(), 0.0, &counts), [false, false, false, true]);
+        assert_eq!(run(&mut Myszkowski1998::new(DEFAULT_SEEN), 0.0, &counts), [false, true, true, true]);
+        assert_eq!(run(&mut Takouachet2007::new(DEFAULT_GROWTH), 0.0, &counts), [false, false, false, true]);
     }
 
     #[test]
@@ -252,17 +230,17 @@ mod tests {
         // σ/√n is 0.1 of a grey of 0.2 at 100 samples and 0.001 at 10⁶.
         let counts = [100, 200, 400, 1_000_000, 2_000_000, 4_000_000];
         // Stricter than the default, by which σ of 0.05 passes now and then
-        let mut strict = Myszkowski1998 { probability: 0.55, ..Myszkowski1998::default() };
+        let mut strict = Myszkowski1998::new(0.55);
         let myszkowski = run(&mut strict, 0.2, &counts);
         assert_eq!(myszkowski, [false, false, false, false, true, true]);
-        let takouachet = run(&mut Takouachet2007::default(), 0.2, &counts);
+        let takouachet = run(&mut Takouachet2007::new(DEFAULT_GROWTH), 0.2, &counts);
         assert_eq!(takouachet[..3], [false; 3]);
         assert!(takouachet[5]);
     }
 
     #[test]
     fn another_film_is_another_run() {
-        let mut criterion = Myszkowski1998::default();
+        let mut criterion = Myszkowski1998::new(DEFAULT_SEEN);
         let judge = |criterion: &mut Myszkowski1998, film: &Film| {
             let tiles: Vec<Tile> = film.grid().tiles().collect();
             criterion.judge(&view(film), &tiles).unwrap()[0].converged

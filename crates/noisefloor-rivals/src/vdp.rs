@@ -4,10 +4,9 @@ mod cortex;
 mod csf;
 mod fourier;
 
-pub use csf::{VdpViewing, VdpViewingError};
-
 use crate::picture::{DifferenceMap, DisplayPixels, MetricError};
 use cortex::Cortex;
+use csf::VdpViewing;
 use noisefloor::display::{luminance, srgb_decode};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -22,10 +21,10 @@ const PSYCHOMETRIC: f32 = 3.5;
 ///
 /// | stage | formula | parameters |
 /// |---|---|---|
-/// | display | L = peak·Y, Y of decoded sRGB | [`VdpViewing::peak`] |
+/// | display | L = peak·Y, Y of decoded sRGB | 100 cd/m² |
 /// | amplitude nonlinearity | R = L/(L + (c₁L)^b) | c₁ = 12.6, b = 0.63 |
-/// | contrast | C = (R/R_a − 1)/(d ln R/d ln L)_a, at the adaptation level a | [`VdpViewing::adaptation`] |
-/// | contrast sensitivity | [`VdpViewing::sensitivity`] | P = 250, ε = 0.9, ob = 0.78 |
+/// | contrast | C = (R/R_a − 1)/(d ln R/d ln L)_a, at the adaptation level a | 18 cd/m² |
+/// | contrast sensitivity | as of Daly, at 40 pixels per degree | P = 250, ε = 0.9, ob = 0.78 |
 /// | cortex transform | dom and fan filters, see below | 5 × 6 + 1 bands |
 /// | masking | T = (1 + (k₁(k₂m)^s)^b)^(1/b), m in threshold units | k₁ = 6^(−7/3), k₂ = 6^(10/3), b = 4 |
 /// | mutual masking | the lesser m of the two pictures | |
@@ -86,16 +85,6 @@ pub(crate) struct Response {
 }
 
 impl Vdp {
-    /// A predictor for a viewing condition.
-    pub fn new(viewing: VdpViewing) -> Result<Self, VdpViewingError> {
-        viewing.check()?;
-        Ok(Self { viewing, cortex: Arc::default() })
-    }
-
-    pub fn viewing(&self) -> &VdpViewing {
-        &self.viewing
-    }
-
     /// The probability, in [0, 1], that an observer sees a difference at each pixel of two pictures.
     /// Symmetric.
     pub fn visible(

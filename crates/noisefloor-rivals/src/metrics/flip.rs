@@ -6,8 +6,7 @@ use nv_flip::FlipImageRgb8;
 
 /// FLIP (Andersson et al. 2020) by NVIDIA's own library: how different two pictures look when flipping
 /// between them, in [0, 1] at each pixel. Its authors report the mean. FLIP's default of `pixels_per_degree`
-/// is 67; the other metrics here use [`crate::VdpViewing::pixels_per_degree`]. Display values are rounded to
-/// 8 bits, as on a screen.
+/// is 67. Display values are rounded to 8 bits, as on a screen.
 pub fn flip(
     reference: &[Rgb],
     test: &[Rgb],
