@@ -271,37 +271,6 @@ fn inverse(m: &Matrix) -> Option<Matrix> {
 mod tests {
     use super::*;
 
-    const AP0: Chromaticities = Chromaticities {
-        red: [0.7347, 0.2653],
-        green: [0.0, 1.0],
-        blue: [0.0001, -0.0770],
-        white: [0.321_68, 0.337_67],
-    };
-    const AP1: Chromaticities = Chromaticities {
-        red: [0.713, 0.293],
-        green: [0.165, 0.830],
-        blue: [0.128, 0.044],
-        white: [0.321_68, 0.337_67],
-    };
-
-    /// Published matrices: ACES by the Academy's transforms (Bradford), Rec.2020 by ITU-R BT.2087, table 2.
-    #[test]
-    fn matrices_are_the_published_ones() {
-        let ap0 = [[2.5217, -1.1340, -0.3876], [-0.2762, 1.3727, -0.0969], [-0.0153, -0.1523, 1.1684]];
-        let ap1 = [[1.7050, -0.6218, -0.0833], [-0.1302, 1.1408, -0.0106], [-0.0240, -0.1290, 1.1530]];
-        let rec2020 = [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]];
-        for (gamut, known) in [(AP0, ap0), (AP1, ap1), (Chromaticities::REC2020, rec2020)] {
-            let ToRec709(matrix) = ToRec709::new(&gamut, None).unwrap().unwrap();
-            for (value, known) in matrix.as_flattened().iter().zip(known.as_flattened()) {
-                assert!((value - known).abs() < 1e-3, "{matrix:?}");
-            }
-        }
-        assert_eq!(ToRec709::new(&Chromaticities::REC709, None), Ok(None));
-        // Light stays light: XYZ of D65 is white
-        let white = ToRec709::new(&XYZ, None).unwrap().unwrap().convert([0.950_46, 1.0, 1.089_06]);
-        assert!(white.iter().all(|v| (v - 1.0).abs() < 1e-3), "{white:?}");
-    }
-
     #[test]
     fn what_no_colours_have_is_refused() {
         let bad = [
@@ -313,6 +282,7 @@ mod tests {
         for colours in bad {
             assert_eq!(ToRec709::new(&colours, None), Err(()), "{colours:?}");
         }
+        assert_eq!(ToRec709::new(&Chromaticities::REC709, None), Ok(None));
     }
 
     /// ST 2084 and BT.2100: the ends; BT.2408, table 1: 203 cd/m² is 58 % PQ and 75 % HLG.

@@ -1,6 +1,6 @@
 //! What can go wrong with picture files. Every message says what, where, and what to do.
 
-use noisefloor::tile::TileError;
+use noisefloor::{Tile, tile::TileError};
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -276,21 +276,16 @@ pub enum StackError {
     },
     /// An image differs in size from the rest of its stack.
     #[error(
-        "{}: {got_width}×{got_height} pixels, but its stack has {width}×{height}; \
-         render it again at that size",
-        path.display()
+        "{}: {}×{} pixels, but its stack has {}×{}; render it again at that size",
+        path.display(), got.0, got.1, size.0, size.1
     )]
     Size {
         /// The image.
         path: PathBuf,
-        /// The stack's width in pixels.
-        width: usize,
-        /// The stack's height in pixels.
-        height: usize,
-        /// The image's width in pixels.
-        got_width: usize,
-        /// The image's height in pixels.
-        got_height: usize,
+        /// The stack's width and height in pixels.
+        size: (usize, usize),
+        /// The image's.
+        got: (usize, usize),
     },
     /// A request for samples from the middle of a stored batch.
     #[error(
@@ -305,22 +300,14 @@ pub enum StackError {
     },
     /// A request for a tile that is not inside the image.
     #[error(
-        "a tile of {tile_width}×{tile_height} pixels at {x}, {y} is not inside the {width}×{height} image; \
-         cut tiles with a TileGrid of that size"
+        "a tile of {}×{} pixels at {}, {} is not inside the {}×{} image; cut tiles with a TileGrid of that size",
+        tile.width, tile.height, tile.x, tile.y, size.0, size.1
     )]
     Tile {
-        /// Left edge in pixels.
-        x: usize,
-        /// Top edge in pixels.
-        y: usize,
-        /// The tile's width in pixels.
-        tile_width: usize,
-        /// The tile's height in pixels.
-        tile_height: usize,
-        /// The image's width in pixels.
-        width: usize,
-        /// The image's height in pixels.
-        height: usize,
+        /// The tile.
+        tile: Tile,
+        /// The image's width and height in pixels.
+        size: (usize, usize),
     },
     /// An image could not be read.
     #[error(transparent)]

@@ -21,13 +21,13 @@ const CACHED: usize = 2;
 /// handed out.
 ///
 /// # Layouts
-/// - **Running means** ([`StackSource::open_running_means`]): `00050.png`, `00100.exr`, … named by their
+/// - **Running means**: `00050.png`, `00100.exr`, … named by their
 ///   samples per pixel. They are nested, so the mean of the new samples is (n₂·I₂ − n₁·I₁)/(n₂ − n₁) in
 ///   linear light; PNGs are linearised first. The difference amplifies their quantisation by n₂/(n₂ − n₁),
 ///   about 200 between 9,900 and 9,950 spp: such a batch says little by itself and may be negative. It is not
 ///   clamped, so that the sum of all batches is the stored image. A value that the PNG clipped at 1 comes out
 ///   as 1: noise on highlights is lost.
-/// - **Batches** ([`StackSource::open_batches`]): `batch_<first>_<last>.exr`, each the mean of samples
+/// - **Batches**: `batch_<first>_<last>.exr`, each the mean of samples
 ///   `first`+1…`last` only.
 ///
 /// # What a request returns
@@ -45,38 +45,18 @@ pub struct StackSource {
 }
 
 impl StackSource {
-    /// Opens a folder of either layout; its file names tell which.
+    /// Opens a folder of either layout; its file names tell which. Reads the first picture.
     ///
     /// # Errors
-    /// [`StackError`] if they follow neither or both, or as for the two other constructors.
+    /// [`StackError`] if they follow neither or both, those of [`running_means`](crate::running_means) and
+    /// [`batches`](crate::batches), or if the first picture cannot be read.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, StackError> {
-        match frames::detect(dir.as_ref())? {
-            Layout::RunningMeans => Self::open_running_means(dir),
-            Layout::Batches => Self::open_batches(dir),
-        }
-    }
-
-    /// Opens a folder of running means, PNG or EXR, named by their samples per pixel. Reads the first of
-    /// them.
-    ///
-    /// # Errors
-    /// [`StackError`] if the folder has none, two claim the same count, or the first cannot be read.
-    pub fn open_running_means(dir: impl AsRef<Path>) -> Result<Self, StackError> {
-        let frames = frames::running_means(dir.as_ref())?;
-        Self::with(dir.as_ref(), Layout::RunningMeans, frames)
-    }
-
-    /// Opens a folder of `batch_<first>_<last>.exr`. Reads the first of them.
-    ///
-    /// # Errors
-    /// [`StackError`] if the folder has none, they leave a gap or overlap (the error names both files), do
-    /// not start at sample 0, or the first cannot be read.
-    pub fn open_batches(dir: impl AsRef<Path>) -> Result<Self, StackError> {
-        let frames = frames::batches(dir.as_ref())?;
-        Self::with(dir.as_ref(), Layout::Batches, frames)
-    }
-
-    fn with(dir: &Path, layout: Layout, frames: Vec<Frame>) -> Result<Self, StackError> {
+        let dir = dir.as_ref();
+        let layout = frames::detect(dir)?;
+        let frames = match layout {
+            Layout::RunningMeans => frames::running_means(dir)?,
+            Layout::Batches => frames::batches(dir)?,
+        };
         let first = read(layout, &frames[0].path)?;
         let folder = dir.file_name().unwrap_or(dir.as_os_str()).to_string_lossy();
         Ok(Self {
@@ -89,11 +69,6 @@ impl StackSource {
         })
     }
 
-    /// Samples per pixel after each stored batch, ascending; the last is the total of the stack.
-    pub fn boundaries(&self) -> impl ExactSizeIterator<Item = u64> {
-        self.frames.iter().map(|frame| frame.last)
-    }
-
     /// An image of the stack by its index, from memory or disk.
     fn image(&mut self, index: usize) -> Result<Arc<LinearImage>, StackError> {
         if let Some((_, image)) = self.cache.iter().find(|(cached, _)| *cached == index) {
@@ -102,13 +77,8 @@ impl StackSource {
         let path = &self.frames[index].path;
         let image = Arc::new(read(self.layout, path)?);
         if (image.width, image.height) != (self.width, self.height) {
-            return Err(StackError::Size {
-                path: path.clone(),
-                width: self.width,
-                height: self.height,
-                got_width: image.width,
-                got_height: image.height,
-            });
+            let (size, got) = ((self.width, self.height), (image.width, image.height));
+            return Err(StackError::Size { path: path.clone(), size, got });
         }
         while self.cache.len() >= CACHED {
             self.cache.pop_front();
@@ -153,14 +123,7 @@ impl StackSource {
         if inside(tile.x, tile.width, self.width) && inside(tile.y, tile.height, self.height) {
             return Ok(());
         }
-        Err(StackError::Tile {
-            x: tile.x,
-            y: tile.y,
-            tile_width: tile.width,
-            tile_height: tile.height,
-            width: self.width,
-            height: self.height,
-        })
+        Err(StackError::Tile { tile: *tile, size: (self.width, self.height) })
     }
 }
 

@@ -91,8 +91,8 @@ fn stacks_on_disk_keep_it() {
         let name = format!("{last:05}.exr");
         write_exr(means.path().join(name), &RenderLayers::rgb(width, height, &mean)).unwrap();
     }
-    check_source(|| StackSource::open_batches(batches.path()).unwrap());
-    check_source(|| StackSource::open_running_means(means.path()).unwrap());
+    check_source(|| StackSource::open(batches.path()).unwrap());
+    check_source(|| StackSource::open(means.path()).unwrap());
 }
 
 /// What `check_source` says of a source.

@@ -87,8 +87,8 @@ fn stacks_on_disk_are_silent() {
         let name = format!("{last:05}.exr");
         write_exr(means.path().join(name), &RenderLayers::rgb(width, height, &running)).unwrap();
     }
-    check_silence(StackSource::open_batches(batches.path()).unwrap(), 400);
-    check_silence(StackSource::open_running_means(means.path()).unwrap(), 400);
+    check_silence(StackSource::open(batches.path()).unwrap(), 400);
+    check_silence(StackSource::open(means.path()).unwrap(), 400);
 }
 
 /// The built-in Cornell box has its lamp in view. Whatever is said is said before a tile stops.

@@ -119,15 +119,15 @@ impl<'a> JudgedImages<'a> {
             .map_err(StackError::from)?;
 
         // All images of a stack have one size
-        let (width, height) = picture.size();
+        let got = picture.size();
         if job.starts_stack {
             self.size = None;
         }
-        let (w, h) = *self.size.get_or_insert((width, height));
-        if (w, h) != (width, height) {
-            let (path, got_width, got_height) = (path.clone(), width, height);
-            return Err(StackError::Size { path, width: w, height: h, got_width, got_height }.into());
+        let size = *self.size.get_or_insert(got);
+        if size != got {
+            return Err(StackError::Size { path: path.clone(), size, got }.into());
         }
+        let (width, height) = size;
 
         let (encoding, pixels) = match &picture {
             Picture::Linear(image) => (Encoding::Linear, &image.pixels),
@@ -137,8 +137,8 @@ impl<'a> JudgedImages<'a> {
             // A batch is only the zone
             let (x, y) = if job.batch { (0, 0) } else { (zone.x, zone.y) };
             let (exact, inside) = (
-                (zone.width, zone.height) == (w, h),
-                x.saturating_add(zone.width) <= w && y.saturating_add(zone.height) <= h,
+                (zone.width, zone.height) == size,
+                x.saturating_add(zone.width) <= width && y.saturating_add(zone.height) <= height,
             );
             if !inside || job.batch && !exact {
                 let (path, scene) = (path.clone(), zone.scene.clone());
@@ -151,7 +151,7 @@ impl<'a> JudgedImages<'a> {
                 last: job.frame.last,
                 encoding,
                 rounding: picture.rounding(),
-                patch: cut(pixels, (w, h), Inner { x, y, width: zone.width, height: zone.height }, HALO),
+                patch: cut(pixels, size, Inner { x, y, width: zone.width, height: zone.height }, HALO),
             });
         }
         Ok(())
