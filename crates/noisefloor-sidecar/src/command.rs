@@ -1,16 +1,15 @@
 //! Any program that renders into a file, as a source.
 
 use crate::contents::contents;
-use crate::error::CommandError;
+use crate::error::{CommandError, RunFault};
 use crate::picture_run::PictureRun;
 use crate::renderer::DEFAULT_TIMEOUT;
-use crate::template::Template;
+use crate::template::{RunValues, Template};
 use noisefloor::{
     Batch, ProgressiveSource, Request, SourceError, SourceInfo, Tile, source::SourceIdentity,
     text::printable, tile::check_image, watch::LightCheck,
 };
 use noisefloor_image::LinearImage;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -113,26 +112,17 @@ impl CommandSource {
     /// was run, too.
     fn run(&mut self, tile: &Tile, samples: u64) -> Result<(LinearImage, String), CommandError> {
         let run = PictureRun::new()?;
-        let words = self.fill(tile, samples, &run.out());
+        let words = self.template.fill_run(&RunValues {
+            scene: self.options.scene.as_deref(),
+            seed: scatter(self.options.seed, self.runs),
+            spp: samples,
+            threshold: 0.0,
+            tile: *tile,
+            size: (self.info.width, self.info.height),
+            out: &run.out(),
+        });
         self.runs += 1;
         run.finish(&words, self.options.timeout)
-    }
-
-    /// The words of the command for a run.
-    fn fill(&self, tile: &Tile, samples: u64, out: &Path) -> Vec<OsString> {
-        let number = |number: u64| OsString::from(number.to_string());
-        self.template.fill(|name| match name {
-            "scene" => self.options.scene.clone().unwrap_or_default().into_os_string(),
-            "seed" => number(scatter(self.options.seed, self.runs)),
-            "spp" => number(samples),
-            "x0" => number(tile.x as u64),
-            "x1" => number((tile.x + tile.width) as u64),
-            "y0" => number(tile.y as u64),
-            "y1" => number((tile.y + tile.height) as u64),
-            "width" => number(self.info.width as u64),
-            "height" => number(self.info.height as u64),
-            _ => out.as_os_str().to_owned(),
-        })
     }
 
     /// One tile.
@@ -170,13 +160,8 @@ impl CommandSource {
         if (image.width, image.height) == (self.info.width, self.info.height) {
             return Ok(());
         }
-        Err(CommandError::Picture {
-            command,
-            width: tile.width,
-            height: tile.height,
-            got_width: image.width,
-            got_height: image.height,
-        })
+        let (size, got) = ((tile.width, tile.height), (image.width, image.height));
+        Err(RunFault::Picture { size, got }.of(command))
     }
 }
 

@@ -219,24 +219,42 @@ pub enum CommandError {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The program ended with an error, or took too long and was killed.
-    #[error("{command}: {how}; its last words: {said}")]
-    Failed {
+    /// A run of the program came to nothing.
+    #[error("{command}: {fault}")]
+    Run {
         /// The whole command.
         command: String,
+        /// What went wrong.
+        fault: RunFault,
+    },
+    /// The picture for the program could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The picture could not be read.
+    #[error(transparent)]
+    Read(#[from] PictureError),
+    /// The picture cannot be the light of a scene.
+    #[error(transparent)]
+    Light(#[from] ImpossibleLight),
+}
+
+/// What went wrong with a run of a program. Sizes are width and height in pixels.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RunFault {
+    /// It ended with an error, or took too long and was killed.
+    #[error("{how}; its last words: {said}")]
+    Failed {
         /// How it ended.
         how: String,
         /// The last lines of its output.
         said: String,
     },
-    /// The program wrote no picture, or several.
+    /// It wrote no picture, or several.
     #[error(
-        "{command}: it wrote {found} where one picture is expected; write to {{out}}.exr or {{out}}.pfm; \
-         its last words: {said}"
+        "it wrote {found} where one picture is expected; write to {{out}}.exr or {{out}}.pfm; its last words: {said}"
     )]
     Output {
-        /// The whole command.
-        command: String,
         /// `no file`, or names of several.
         found: String,
         /// The last lines of its output.
@@ -244,56 +262,33 @@ pub enum CommandError {
     },
     /// The picture has neither the size of the tile nor that of the whole image.
     #[error(
-        "{command}: its picture has {got_width}×{got_height} pixels, \
-         neither {width}×{height} as requested nor those of the whole image"
+        "its picture has {}×{} pixels, neither {}×{} as requested nor those of the whole image",
+        got.0, got.1, size.0, size.1
     )]
     Picture {
-        /// The whole command.
-        command: String,
-        /// Width requested, in pixels.
-        width: usize,
-        /// Height requested, in pixels.
-        height: usize,
-        /// The picture's width in pixels.
-        got_width: usize,
-        /// The picture's height in pixels.
-        got_height: usize,
+        /// Size requested.
+        size: (usize, usize),
+        /// The picture's size.
+        got: (usize, usize),
     },
     /// The picture has another size than the one that the program was given.
-    #[error(
-        "{command}: its picture has {got_width}×{got_height} pixels, but it was given one of {width}×{height}"
-    )]
+    #[error("its picture has {}×{} pixels, but it was given one of {}×{}", got.0, got.1, size.0, size.1)]
     Resized {
-        /// The whole command.
-        command: String,
-        /// Width given, in pixels.
-        width: usize,
-        /// Height given, in pixels.
-        height: usize,
-        /// The picture's width in pixels.
-        got_width: usize,
-        /// The picture's height in pixels.
-        got_height: usize,
+        /// Size given.
+        size: (usize, usize),
+        /// The picture's size.
+        got: (usize, usize),
     },
     /// The picture has pixels that are not finite.
-    #[error("{command}: its picture has pixels that are not finite; check the program and its options")]
-    NotFinite {
-        /// The whole command.
-        command: String,
-    },
-    /// The picture for the program could not be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
+    #[error("its picture has pixels that are not finite; check the program and its options")]
+    NotFinite,
     /// The picture is display-encoded.
-    #[error("{command}: its picture is a PNG, whose values are clipped and encoded; write EXR or PFM")]
-    Display {
-        /// The whole command.
-        command: String,
-    },
-    /// The picture could not be read.
-    #[error(transparent)]
-    Read(#[from] PictureError),
-    /// The picture cannot be the light of a scene.
-    #[error(transparent)]
-    Light(#[from] ImpossibleLight),
+    #[error("its picture is a PNG, whose values are clipped and encoded; write EXR or PFM")]
+    Display,
+}
+
+impl RunFault {
+    pub(crate) fn of(self, command: String) -> CommandError {
+        CommandError::Run { command, fault: self }
+    }
 }

@@ -85,7 +85,7 @@ mod template;
 mod threshold_command;
 
 pub use command::{CommandOptions, CommandSource};
-pub use error::{CommandError, SetupError, SidecarCause, SidecarError};
+pub use error::{CommandError, RunFault, SetupError, SidecarCause, SidecarError};
 #[doc(hidden)]
 pub use fuzzing::read_any_reply;
 pub use leftovers::end_all;

@@ -1,6 +1,6 @@
 //! A program that turns one picture into another.
 
-use crate::error::CommandError;
+use crate::error::{CommandError, RunFault};
 use crate::picture_run::PictureRun;
 use crate::template::Template;
 use noisefloor_image::{LinearImage, RenderLayers, write_exr};
@@ -37,13 +37,12 @@ impl PictureCommand {
         let value = |name: &str| if name == "in" { given.clone() } else { out.clone() };
         let words = self.template.fill(|name| value(name).into_os_string());
         let (made, command) = run.finish(&words, self.timeout)?;
-        let (width, height) = (image.width, image.height);
-        if (made.width, made.height) != (width, height) {
-            let (got_width, got_height) = (made.width, made.height);
-            return Err(CommandError::Resized { command, width, height, got_width, got_height });
+        let (size, got) = ((image.width, image.height), (made.width, made.height));
+        if got != size {
+            return Err(RunFault::Resized { size, got }.of(command));
         }
         if !made.pixels.iter().flatten().all(|c| c.is_finite()) {
-            return Err(CommandError::NotFinite { command });
+            return Err(RunFault::NotFinite.of(command));
         }
         Ok(made)
     }

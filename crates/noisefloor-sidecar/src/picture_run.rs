@@ -1,6 +1,6 @@
 //! One run of a program that writes a picture.
 
-use crate::error::CommandError;
+use crate::error::{CommandError, RunFault};
 use crate::group::Group;
 use crate::scratch::Scratch;
 use noisefloor::text::printable;
@@ -60,7 +60,7 @@ impl PictureRun {
         let mut group =
             started.map_err(|source| CommandError::Start { program: lossy[0].to_string(), source })?;
         if let Err(how) = wait(&mut group, timeout) {
-            return Err(CommandError::Failed { command, how, said: tail(&log) });
+            return Err(RunFault::Failed { how, said: tail(&log) }.of(command));
         }
         drop(group);
 
@@ -69,15 +69,12 @@ impl PictureRun {
         let [file] = files.as_slice() else {
             let names: Vec<_> = files.iter().map(|f| f.file_name().to_string_lossy().into_owned()).collect();
             let found = if names.is_empty() { "no file".to_owned() } else { names.join(", ") };
-            return Err(CommandError::Output {
-                command,
-                found: printable(&found).into_owned(),
-                said: tail(&log),
-            });
+            let found = printable(&found).into_owned();
+            return Err(RunFault::Output { found, said: tail(&log) }.of(command));
         };
         match read_picture(file.path())? {
             Picture::Linear(image) => Ok((image, command)),
-            Picture::Display(_) => Err(CommandError::Display { command }),
+            Picture::Display(_) => Err(RunFault::Display.of(command)),
         }
     }
 }

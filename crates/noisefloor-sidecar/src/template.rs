@@ -1,12 +1,25 @@
 //! Command lines with placeholders.
 
 use crate::error::CommandError;
+use noisefloor::Tile;
 use std::ffi::{OsStr, OsString};
+use std::path::Path;
 
 /// Every placeholder of a command that renders.
 const PLACEHOLDERS: [&str; 10] = ["scene", "seed", "spp", "x0", "x1", "y0", "y1", "width", "height", "out"];
 /// The corners of a tile; a template has all of them or none.
 const CORNERS: [&str; 4] = ["x0", "x1", "y0", "y1"];
+
+/// What a command that renders is given, by the names of placeholders.
+pub(crate) struct RunValues<'a> {
+    pub(crate) scene: Option<&'a Path>,
+    pub(crate) seed: u64,
+    pub(crate) spp: u64,
+    pub(crate) threshold: f64,
+    pub(crate) tile: Tile,
+    pub(crate) size: (usize, usize),
+    pub(crate) out: &'a Path,
+}
 
 /// The words of a command, checked.
 #[derive(Debug)]
@@ -61,6 +74,24 @@ impl Template {
     /// Whether it renders single tiles.
     pub(crate) fn aims(&self) -> bool {
         CORNERS.iter().any(|corner| self.has(corner))
+    }
+
+    /// The words of a run that renders.
+    pub(crate) fn fill_run(&self, values: &RunValues<'_>) -> Vec<OsString> {
+        let RunValues { scene, seed, spp, threshold, tile, size, out } = values;
+        self.fill(|name| match name {
+            "scene" => scene.unwrap_or(Path::new("")).into(),
+            "seed" => seed.to_string().into(),
+            "spp" => spp.to_string().into(),
+            "threshold" => threshold.to_string().into(),
+            "x0" => tile.x.to_string().into(),
+            "x1" => (tile.x + tile.width).to_string().into(),
+            "y0" => tile.y.to_string().into(),
+            "y1" => (tile.y + tile.height).to_string().into(),
+            "width" => size.0.to_string().into(),
+            "height" => size.1.to_string().into(),
+            _ => out.into(),
+        })
     }
 
     /// The words with their placeholders filled in. Values may be any file name, Unicode or not.

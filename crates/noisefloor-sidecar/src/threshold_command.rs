@@ -1,11 +1,10 @@
 //! Any program that samples until a noise threshold of its own.
 
-use crate::error::CommandError;
+use crate::error::{CommandError, RunFault};
 use crate::picture_run::PictureRun;
-use crate::template::Template;
+use crate::template::{RunValues, Template};
 use noisefloor::Tile;
 use noisefloor_image::LinearImage;
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -61,22 +60,18 @@ impl ThresholdCommand {
         let run = PictureRun::new()?;
         let (out, (width, height)) = (run.out(), self.size.unwrap_or_default());
         let wanted = part.unwrap_or(Tile { index: 0, x: 0, y: 0, width, height });
-        let words = self.template.fill(|name| match name {
-            "scene" => self.scene.clone().unwrap_or_default().into_os_string(),
-            "threshold" => OsString::from(threshold.to_string()),
-            "spp" => OsString::from(most.to_string()),
-            "seed" => OsString::from(seed.to_string()),
-            "width" => OsString::from(width.to_string()),
-            "height" => OsString::from(height.to_string()),
-            "x0" => OsString::from(wanted.x.to_string()),
-            "y0" => OsString::from(wanted.y.to_string()),
-            "x1" => OsString::from((wanted.x + wanted.width).to_string()),
-            "y1" => OsString::from((wanted.y + wanted.height).to_string()),
-            _ => out.clone().into_os_string(),
+        let words = self.template.fill_run(&RunValues {
+            scene: self.scene.as_deref(),
+            seed: seed.into(),
+            spp: most,
+            threshold,
+            tile: wanted,
+            size: (width, height),
+            out: &out,
         });
         let (made, command) = run.finish(&words, self.timeout)?;
         if !made.pixels.iter().flatten().all(|c| c.is_finite()) {
-            return Err(CommandError::NotFinite { command });
+            return Err(RunFault::NotFinite.of(command));
         }
         let Some(part) = part else { return Ok(made) };
         if (made.width, made.height) == (width, height) {
