@@ -28,6 +28,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use strsim::levenshtein;
 
 /// Where neither the command nor the scene says: a Cornell box takes half a minute.
 const DEFAULT_SCENE: &str = "cornell-box";
@@ -397,7 +398,8 @@ fn load(scene: &OsStr, options: &LoadOptions) -> anyhow::Result<Loaded> {
     if path.extension().is_none() && !path.exists() {
         let typed = scene.to_string_lossy();
         let names = scenes::list().chain(scenes::stiff()).map(|scene| scene.name);
-        let near = names.min_by_key(|name| edits(&typed, name)).filter(|name| edits(&typed, name) <= 2);
+        let near =
+            names.min_by_key(|name| levenshtein(&typed, name)).filter(|name| levenshtein(&typed, name) <= 2);
         let meant = near.map_or(String::new(), |name| format!("did you mean {name}? "));
         bail!(
             "there is no built-in scene {scene:?}, and no file of that name; \
@@ -435,21 +437,6 @@ fn elsewhere(path: &Path) -> Option<&'static str> {
         }
         _ => return None,
     })
-}
-
-/// Letters to add, leave out or replace to make one word of the other (Levenshtein 1966).
-fn edits(one: &str, other: &str) -> usize {
-    let other: Vec<char> = other.chars().collect();
-    let mut row: Vec<usize> = (0..=other.len()).collect();
-    for (i, a) in one.chars().enumerate() {
-        let mut before = std::mem::replace(&mut row[0], i + 1);
-        for (j, b) in other.iter().enumerate() {
-            let replaced = before + usize::from(a != *b);
-            before = row[j + 1];
-            row[j + 1] = replaced.min(before + 1).min(row[j] + 1);
-        }
-    }
-    row[other.len()]
 }
 
 /// `hall` of `rooms/hall.xml`, and of `rooms/hall/`.

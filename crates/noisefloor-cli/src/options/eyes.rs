@@ -1,10 +1,11 @@
 //! Whose eyes.
 
-use super::oracle::load_model;
+use super::oracle::{OracleArgs, load_model};
+use super::viewing::ViewingArgs;
 use crate::refuse;
 use crate::say::note;
 use clap::Args;
-use noisefloor::Model;
+use noisefloor::{Audience, Model, Oracle, Viewing};
 use noisefloor_eyes::{Eyes, Person};
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -34,7 +35,38 @@ impl FromStr for EyesChoice {
     }
 }
 
+/// An oracle, where it looks, and for whom.
+pub struct Seen {
+    pub oracle: Oracle,
+    pub viewing: Viewing,
+    pub audience: Audience,
+}
+
 impl EyesArgs {
+    /// By the eyes that count, or by what was typed.
+    pub fn look(
+        &self,
+        oracle: &OracleArgs,
+        viewing: &ViewingArgs,
+        audience: Option<Audience>,
+    ) -> anyhow::Result<Seen> {
+        let said = [("--viewing", viewing.typed().is_some()), ("--audience", audience.is_some())];
+        let person = self.of(oracle.model.as_deref(), &said)?;
+        let oracle = oracle.check()?;
+        Ok(match person {
+            Some(person) => Seen {
+                oracle: oracle.with_scatter(person.uncertainty()),
+                viewing: person.viewing(),
+                audience: person.audience(),
+            },
+            None => Seen {
+                viewing: viewing.judged_by(&oracle)?,
+                audience: audience.unwrap_or(Audience::TRAINED),
+                oracle,
+            },
+        })
+    }
+
     /// Beside what looks with other eyes, a file has no effect: it is read even so, and that is said.
     pub fn unused(&self, beside: &str) -> anyhow::Result<()> {
         if let Some(EyesChoice::File(path)) = &self.eyes {

@@ -1,5 +1,4 @@
-use crate::kit::{fail, succeed, text};
-use serde_json::Value;
+use crate::kit::{fail, said_json, succeed, text};
 use tempfile::tempdir;
 
 #[test]
@@ -17,7 +16,7 @@ fn a_line_is_fitted_and_can_be_pasted() {
     assert!(said.contains("T' = 1.940 T - 346.0") && said.contains("8 pairs"), "{said}");
     assert!(said.contains("gather more") && said.contains("--audience 1.9400,-346.00"), "{said}");
 
-    let report: Value = serde_json::from_str(&succeed(&["audience", "fit", text(&file), "--json"])).unwrap();
+    let report = said_json(&["audience", "fit", text(&file), "--json"]);
     assert!((report["line"]["slope"].as_f64().unwrap() - 1.94).abs() < 1e-6, "{report}");
     let argument = report["argument"].as_str().unwrap();
     let out = folder.path().join("out");

@@ -1,4 +1,4 @@
-use crate::kit::{fail, json, run, stderr, succeed, text};
+use crate::kit::{fail, json, run, said_json, stderr, succeed, text, words};
 use noisefloor_image::{Picture, read_exr, read_picture};
 use serde_json::Value;
 use std::path::Path;
@@ -32,7 +32,7 @@ fn a_picture_stopped_too_early_fails_and_a_converged_one_passes() {
     assert_eq!((report["audit"]["kept"].as_u64(), report["samples"].as_u64()), (Some(4), Some(4 * 64 * 64)));
     let audit = |seed: &str| -> Value {
         let typed = ["audit", text(&early), "--places", "2", "--seed", seed, "--json"];
-        let mut audit: Value = serde_json::from_str(&succeed(&typed)).unwrap();
+        let mut audit: Value = said_json(&typed);
         audit["seconds"].take();
         audit["share_of_render"].take();
         audit
@@ -52,8 +52,7 @@ fn the_picture_in_the_folder_is_looked_at() {
     let out = folder.path().join("out");
     succeed(&boxed(&out, "spp:64", &["--quiet"]));
     let lost = |limit: &str| {
-        let audit: Value =
-            serde_json::from_str(&succeed(&["audit", text(&out), "--json", "--lost", limit])).unwrap();
+        let audit = said_json(&["audit", text(&out), "--json", "--lost", limit]);
         assert_eq!(audit["limit"].as_f64(), limit.parse().ok());
         audit["worst"].as_f64().unwrap()
     };
@@ -80,18 +79,7 @@ fn what_cannot_be_audited_says_why() {
     fail(&["audit", text(&empty)], &["empty", "holds no render"]);
     assert!(std::fs::read_dir(&empty).unwrap().next().is_none());
     // Tiles that were cut short promise nothing
-    succeed(&[
-        "render",
-        "--size",
-        "32x32",
-        "--tile",
-        "32",
-        "--max-spp",
-        "16",
-        "--quiet",
-        "--out",
-        text(&out),
-    ]);
+    succeed(&words(&format!("render --size 32x32 --tile 32 --max-spp 16 --quiet --out {}", text(&out))));
     fail(&["audit", text(&out)], &["no tile has stopped for its noise"]);
     // A tile that the picture does not have
     let stops = std::fs::read_to_string(out.join("stops.csv")).unwrap();
@@ -104,20 +92,10 @@ fn what_cannot_be_audited_says_why() {
         crate::kit::grey_exr(&stack.join(name), (32, 32), seed, 0.4);
     }
     let played = folder.path().join("played");
-    succeed(&[
-        "render",
-        "--source",
-        "exr",
+    succeed(&words(&format!(
+        "render --source exr {} --tile 32 --criterion spp:8 --min-spp 4 --quiet --out {}",
         text(&stack),
-        "--tile",
-        "32",
-        "--criterion",
-        "spp:8",
-        "--min-spp",
-        "4",
-        "--quiet",
-        "--out",
-        text(&played),
-    ]);
+        text(&played)
+    )));
     fail(&["audit", text(&played)], &["played back"]);
 }

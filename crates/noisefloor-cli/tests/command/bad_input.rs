@@ -183,32 +183,26 @@ fn corpora() {
 }
 
 /// What a failed run leaves of an earlier one's files: every byte.
-fn keeps_earlier_files(bad: &[&str], words: &[&str]) {
+#[test]
+fn earlier_files_stay_when_a_run_cannot_begin() {
     let folder = tempdir().unwrap();
     let out = text(folder.path());
     succeed(&tiny(out, &["--criterion", "spp:100"]));
     let read = || FILES.map(|name| std::fs::read(folder.path().join(name)).unwrap());
     let before = read();
-    let mut args = vec!["render", "--quiet", "--size", "64x64", "--out", out];
-    args.extend(bad);
-    fail(&args, words);
-    for ((name, before), after) in FILES.iter().zip(before).zip(read()) {
-        assert!(before == after, "{name} was touched by a run that failed: {bad:?}");
+    for (bad, said) in [
+        (&["no-such-scene"][..], "no-such-scene"),
+        (&["--model", "absent.nfm"], "absent.nfm"),
+        (&["--against", "absent.exr"], "absent.exr"),
+        (&["--consecutive", "0"], "at least one"),
+        (&["--tile", "0"], "16…512"),
+        (&["--autosave", "nan"], "--autosave"),
+    ] {
+        fail(&[&["render", "--quiet", "--size", "64x64", "--force", "--out", out], bad].concat(), &[said]);
+        for ((name, before), after) in FILES.iter().zip(&before).zip(read()) {
+            assert!(*before == after, "{name} was touched by a run that failed: {bad:?}");
+        }
     }
-}
-
-#[test]
-fn earlier_files_stay_when_a_run_cannot_begin() {
-    keeps_earlier_files(&["no-such-scene"], &["no-such-scene"]);
-    keeps_earlier_files(&["--model", "absent.nfm"], &["absent.nfm"]);
-    keeps_earlier_files(&["--against", "absent.exr"], &["absent.exr"]);
-    keeps_earlier_files(&["--consecutive", "0"], &["at least one"]);
-}
-
-#[test]
-fn earlier_files_stay_when_the_last_check_fails() {
-    keeps_earlier_files(&["--tile", "0"], &["16…512"]);
-    keeps_earlier_files(&["--autosave", "nan"], &["--autosave"]);
 }
 
 /// Before the work, and not after it.

@@ -1,25 +1,12 @@
-use crate::kit::{column, fail, json, succeed, text};
+use crate::kit::{column, fail, json, succeed, text, words};
 use noisefloor_denoise::OIDN;
 use noisefloor_sidecar::find;
 use noisefloor_testkit::{Requirement, require};
 use tempfile::tempdir;
 
 fn small<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    let small = [
-        "compare",
-        "cornell-box",
-        "--size",
-        "64x64",
-        "--tile",
-        "32",
-        "--max-spp",
-        "200",
-        "--reference-spp",
-        "256",
-        "--out",
-        out,
-    ];
-    small.iter().chain(more).copied().collect()
+    let small = "compare cornell-box --size 64x64 --tile 32 --max-spp 200 --reference-spp 256 --out";
+    [words(small).as_slice(), &[out], more].concat()
 }
 
 /// Criteria watch one run: a fixed number of samples is a point of the uniform curve, and what stops
@@ -31,22 +18,11 @@ fn a_fixed_number_of_samples_lies_on_the_curve_of_uniform_sampling() {
     let said = succeed(&small(out, &["--criteria", "spp:50,spp:200,oracle,cycles:1"]));
     assert!(said.contains("cornell-box") && said.contains("index.html"), "{said}");
     let scene = folder.path().join("cornell-box");
-    for file in [
-        "curve.csv",
-        "tiles.csv",
-        "by-samples.svg",
-        "by-samples.png",
-        "by-seconds.svg",
-        "by-seconds.png",
-        "reference.exr",
-        "reference.json",
-        "reference.png",
-        "spp-50.png",
-        "oracle.png",
-        "cycles-1.png",
-        "crop-worst.png",
-        "crop-disputed.png",
-    ] {
+    let files =
+        "curve.csv tiles.csv by-samples.svg by-samples.png by-seconds.svg by-seconds.png reference.exr";
+    let pictures =
+        "reference.json reference.png spp-50.png oracle.png cycles-1.png crop-worst.png crop-disputed.png";
+    for file in [words(files), words(pictures)].concat() {
         assert!(scene.join(file).is_file(), "{file}");
     }
 

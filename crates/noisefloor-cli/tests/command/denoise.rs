@@ -1,4 +1,6 @@
-use crate::kit::{FILES, column, command, fail, json, random, run, stderr, succeed, text, tiny};
+use crate::kit::{
+    FILES, column, command, fail, json, random, run, stderr, succeed, text, tiny, wait_for, words,
+};
 use noisefloor_denoise::OIDN;
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::find;
@@ -84,10 +86,8 @@ fn killed_denoised_renders_lose_nothing() {
         let rest = ["--max-spp", "700", "--threads", "1", "--quiet", "--autosave", "0.1", "--out", text(out)];
         args.iter().chain(&rest).chain(more).map(|word| (*word).to_owned()).collect()
     };
-    let words = arguments(whole.path(), &[]);
-    succeed(&words.iter().map(String::as_str).collect::<Vec<_>>());
+    succeed(&arguments(whole.path(), &[]));
     let resume = arguments(killed.path(), &["--resume"]);
-    let resume: Vec<&str> = resume.iter().map(String::as_str).collect();
     let saved = killed.path().join("checkpoint.nfc");
     let last_save = || std::fs::metadata(&saved).and_then(|file| file.modified()).ok();
     let mut cut = 0;
@@ -139,24 +139,19 @@ fn denoised_pictures_made_elsewhere() {
             ["judge", &a, "--spp", "50", "--against", &b, "--spp", "50", "--tile", "32", "--lost", "0.2"];
         all.iter().chain(more).map(|word| (*word).to_owned()).collect()
     };
-    let say = |more: &[&str]| {
-        let words = judge(more);
-        succeed(&words.iter().map(String::as_str).collect::<Vec<_>>())
-    };
+    let say = |more: &[&str]| succeed(&judge(more));
     let map = path("map.png");
     let clean = say(&["--independent", "--denoised", &good, &good2, "--noise-map", &map]);
     assert!(clean.contains("4 of 4 denoised tiles") && clean.contains("nobody has been asked"), "{clean}");
     assert!(Path::new(&map).exists());
     // Any number of threads says the same
     assert_eq!(say(&["--independent", "--threads", "1", "--denoised", &good, &good2]), clean);
-    let json = say(&["--independent", "--json", "--denoised", &bad, &bad2]);
-    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");
-
-    // Too bright by 0.3, with all details right
-    let json = say(&["--independent", "--json", "--denoised", &bright, &bright2]);
-    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");
+    // Without details, and too bright by 0.3 with all of them right
+    for [one, other] in [[&bad, &bad2], [&bright, &bright2]] {
+        let json = say(&["--independent", "--json", "--denoised", one, other]);
+        let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(report["converged_tiles"].as_u64(), Some(0), "{json}");
+    }
 
     // What one picture alone has met, the other tiles may lack; a denoiser takes it for noise
     let mut met = stripes(&mut random(1));
@@ -164,22 +159,9 @@ fn denoised_pictures_made_elsewhere() {
     let (met_path, [a_again, b_again]) = (path("met.exr"), [&a, &b]);
     write_exr(&met_path, &RenderLayers::rgb(64, 64, &met)).unwrap();
     for [first, second] in [[&met_path, b_again], [a_again, &met_path]] {
-        let words = [
-            "judge",
-            first,
-            "--spp",
-            "8",
-            "--against",
-            second,
-            "--spp",
-            "8",
-            "--tile",
-            "32",
-            "--lost",
-            "0.2",
-        ];
-        let made = ["--independent", "--json", "--denoised", &good, &good2];
-        let json = succeed(&[&words[..], &made].concat());
+        let line =
+            format!("judge {first} {second} --spp 8 --spp 8 --tile 32 --lost 0.2 --independent --json");
+        let json = succeed(&[words(&line), vec!["--denoised", &good, &good2]].concat());
         let report: serde_json::Value = serde_json::from_str(&json).unwrap();
         let unmet: Vec<bool> = report["tiles"]
             .as_array()
@@ -191,10 +173,7 @@ fn denoised_pictures_made_elsewhere() {
         assert!(report["converged_tiles"].as_u64().unwrap() <= 1, "{json}");
     }
 
-    let refuse = |more: &[&str], words: &[&str]| {
-        let typed = judge(more);
-        fail(&typed.iter().map(String::as_str).collect::<Vec<_>>(), words);
-    };
+    let refuse = |more: &[&str], words: &[&str]| fail(&judge(more), words);
     refuse(&["--nested", "--denoised", &good, &bad], &["--nested"]);
     refuse(&["--denoised", &good], &["--denoised"]);
     refuse(&["--independent", "--denoised", &a, &bad], &["identical"]);
@@ -255,13 +234,10 @@ fn a_denoiser_that_hangs_costs_no_samples() {
     assert!(render(&whole, &[]).status().unwrap().success());
 
     std::fs::write(&hang, "").unwrap();
-    let mut child = render(&broken, &[]).spawn().unwrap();
+    let child = render(&broken, &[]).spawn().unwrap();
     // The first verdict hangs, however long a busy machine takes to get there
     let hanging = folder.path().join("hanging");
-    while !hanging.exists() {
-        assert!(child.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    wait_for("the denoiser", || hanging.exists().then_some(()));
     let id = child.id().to_string();
     assert!(std::process::Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
     let begun = std::time::Instant::now();
@@ -289,10 +265,7 @@ fn a_denoiser_that_hangs_costs_no_samples() {
     std::fs::write(&hang, "1").unwrap();
     let killed = folder.path().join("killed");
     let mut child = render(&killed, &[]).spawn().unwrap();
-    while !hanging.exists() {
-        assert!(child.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    wait_for("the denoiser", || hanging.exists().then_some(()));
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(!killed.join("denoised-error.png").exists());

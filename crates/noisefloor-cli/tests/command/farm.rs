@@ -1,10 +1,9 @@
-use crate::kit::{command, fail, json, run, stderr, succeed, text};
+use crate::kit::{command, fail, json, run, said_json, stderr, succeed, text, wait_for};
 use noisefloor_image::{read_exr, read_facts};
-use noisefloor_testkit::HANG;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tempfile::tempdir;
 
 /// Of 24 tiles: some stop early, some late, and one round has several tasks.
@@ -28,17 +27,6 @@ pub(crate) fn assert_same(one: &Path, other: &Path) {
     let stops = |dir: &Path| fs::read_to_string(dir.join("stops.csv")).unwrap();
     assert_eq!(stops(one), stops(other));
     assert_eq!(json(&other.join("report.json"))["complete"], true);
-}
-
-pub(crate) fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
-    let began = Instant::now();
-    loop {
-        if let Some(found) = found() {
-            return found;
-        }
-        assert!(began.elapsed() < HANG, "{what} did not happen");
-        std::thread::sleep(Duration::from_millis(20));
-    }
 }
 
 pub(crate) fn shards(folder: &Path) -> Vec<PathBuf> {
@@ -315,8 +303,7 @@ fn a_farm_renders_the_frames_of_a_sequence() {
         let status = succeed(&["farm", "status", text(&dir)]);
         assert!(status.contains("0002: waits for"), "{status}");
         assert!(status.contains("0001: waits for") == (name == "third"), "{status}");
-        let told: serde_json::Value =
-            serde_json::from_str(&succeed(&["farm", "status", text(&dir), "--json"])).unwrap();
+        let told = said_json(&["farm", "status", text(&dir), "--json"]);
         assert!(told["frames"][1]["waits"] == true && told["frames"][1]["spp"] == 0.0, "{told}");
         assert_eq!(told["frames"][0]["waits"], name == "third");
         // A coordinator that is started again between the rounds, and pictures as far as they are

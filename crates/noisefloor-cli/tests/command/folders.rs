@@ -1,8 +1,6 @@
-use crate::kit::{command, fail, json, run, stderr, succeed, text, tiny};
-use noisefloor_testkit::HANG;
+use crate::kit::{command, fail, json, run, stderr, succeed, text, tiny, wait_for};
 use std::path::Path;
 use std::process::Stdio;
-use std::time::{Duration, Instant};
 use tempfile::{TempDir, tempdir};
 
 /// Refused as what was typed wrong is, with one line.
@@ -94,11 +92,7 @@ fn one_folder_takes_one_render_at_a_time() {
     // The largest number of samples was given twice, the last time by the criterion
     let long: Vec<&str> = long.into_iter().filter(|arg| !["--max-spp", "200"].contains(arg)).collect();
     let mut first = command(&long).stdout(Stdio::null()).spawn().unwrap();
-    let begun = Instant::now();
-    while !folder.path().join("report.json").exists() {
-        assert!(begun.elapsed() < HANG);
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    wait_for("the first save", || folder.path().join("report.json").exists().then_some(()));
     for more in [&["--force"], &["--resume"]] {
         fail(&tiny(out, more), &["another noisefloor is writing into this folder"]);
     }
@@ -129,21 +123,14 @@ fn edit(folder: &Path) {
 fn a_scene_that_was_edited_is_not_resumed() {
     let (folder, scene) = scene();
     let out = folder.path().join("out");
-    let render = |more: &[&'static str]| {
-        let args =
-            ["render", text(&scene), "--size", "64x64", "--tile", "32", "--quiet", "--out", text(&out)];
-        [&args[..], more].concat().into_iter().map(str::to_owned).collect::<Vec<_>>()
-    };
-    let words = |args: &[String], words: &[&str]| {
-        fail(&args.iter().map(String::as_str).collect::<Vec<_>>(), words);
-    };
-    let begin = render(&["--time", "0.000001"]);
-    succeed(&begin.iter().map(String::as_str).collect::<Vec<_>>());
+    let job = ["render", text(&scene), "--size", "64x64", "--tile", "32", "--quiet", "--out", text(&out)];
+    let render = |more: &[&'static str]| [&job[..], more].concat();
+    succeed(&render(&["--time", "0.000001"]));
     let resume = render(&["--resume", "--time", "0.000001"]);
-    succeed(&resume.iter().map(String::as_str).collect::<Vec<_>>());
-    words(&render(&["--resume", "-D", "level=2"]), &["belongs to another job", "level"]);
+    succeed(&resume);
+    fail(&render(&["--resume", "-D", "level=2"]), &["belongs to another job", "level"]);
     edit(folder.path());
-    words(&resume, &["checkpoint.nfc", "`rest.xml` has changed", "--force"]);
+    fail(&resume, &["checkpoint.nfc", "`rest.xml` has changed", "--force"]);
 }
 
 #[test]

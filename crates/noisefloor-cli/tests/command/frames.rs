@@ -1,5 +1,4 @@
-use crate::kit::{column, command, fail, json, stderr, succeed, text};
-use noisefloor_testkit::HANG;
+use crate::kit::{column, command, fail, json, stderr, succeed, text, wait_for};
 use std::fs;
 use std::path::Path;
 use tempfile::{TempDir, tempdir};
@@ -57,17 +56,8 @@ fn a_sequence_is_rendered_and_resumed_frame_by_frame() {
     assert!(picture(&out, 1) != picture(&out, 2) && picture(&out, 2) != picture(&out, 3));
     // As without the interruption
     let again = folder.path().join("again");
-    succeed(&[
-        "render",
-        "--config",
-        text(&shot),
-        "--frames",
-        "1-3",
-        text(&scene),
-        "--out",
-        text(&again),
-        "--quiet",
-    ]);
+    let render = ["render", "--config", text(&shot), "--frames", "1-3", text(&scene), "--out", text(&again)];
+    succeed(&render);
     assert!((1..=3).all(|frame| picture(&out, frame) == picture(&again, frame)));
 }
 
@@ -307,22 +297,15 @@ fn a_killed_sequence_leaves_no_frame_rendering() {
     let render = ["render", "--config", text(&shot), "--frames", "1-1", text(&scene), "--out", text(&out)];
     let mut parent =
         command(&[&render[..], &long].concat()).stderr(std::process::Stdio::null()).spawn().unwrap();
-    let wait = |what: &str, done: &dyn Fn() -> bool| {
-        let began = std::time::Instant::now();
-        while !done() {
-            assert!(began.elapsed() < HANG, "{what}");
-            std::thread::sleep(std::time::Duration::from_millis(50));
-        }
-    };
     let lock = out.join("0001/.noisefloor.lock");
     let locked = || fs::File::open(&lock).is_ok_and(|lock| lock.try_lock().is_err());
     // Killed before its first samples, it would have nothing to write
     let checkpoint = out.join("0001/checkpoint.nfc");
-    wait("the frame has samples", &|| checkpoint.exists());
+    wait_for("the first samples of the frame", || checkpoint.exists().then_some(()));
     fs::remove_file(&checkpoint).unwrap();
     parent.kill().unwrap();
     parent.wait().unwrap();
-    wait("the frame ends", &|| !locked());
+    wait_for("the end of the frame", || (!locked()).then_some(()));
     assert!(checkpoint.exists(), "it has written what it had");
 }
 
@@ -342,21 +325,14 @@ fn a_killed_sequence_is_resumed_as_if_it_had_not_been() {
     assert!(render(&whole, &[]).status().unwrap().success());
     let lock = out.join("0001/.noisefloor.lock");
     let locked = || fs::File::open(&lock).is_ok_and(|lock| lock.try_lock().is_err());
-    let wait = |done: &dyn Fn() -> bool| {
-        let began = std::time::Instant::now();
-        while !done() {
-            assert!(began.elapsed() < HANG, "the first frame begins and ends");
-            std::thread::sleep(std::time::Duration::from_millis(2));
-        }
-    };
     // A machine may take so long to come back here that the frame is done: then once more
     let cut = (0..20).any(|_| {
         drop(fs::remove_dir_all(&out));
         let mut killed = render(&out, &[]).stderr(std::process::Stdio::null()).spawn().unwrap();
-        wait(&locked);
+        wait_for("the first frame", || locked().then_some(()));
         killed.kill().unwrap();
         killed.wait().unwrap();
-        wait(&|| !locked());
+        wait_for("its end", || (!locked()).then_some(()));
         !out.join("exposure.json").exists()
     });
     assert!(cut, "the sequence was never killed before its exposure was known");

@@ -1,18 +1,27 @@
-use crate::kit::{channel, fail, grey_exr, random, run, stderr, succeed, text, tiny};
+use crate::kit::{channel, fail, grey_exr, random, run, said_json, stderr, succeed, text, tiny};
 use noisefloor_image::{Picture, RenderLayers, SampleFacts, read_exr, read_facts, read_picture, write_exr};
 use serde_json::Value;
-use std::path::PathBuf;
-use tempfile::tempdir;
+use std::path::{Path, PathBuf};
+use tempfile::{TempDir, tempdir};
+
+/// The picture of a small render, in a folder of its own.
+fn rendered(folder: &TempDir, name: &str, more: &[&str]) -> PathBuf {
+    let out = folder.path().join(name);
+    succeed(&tiny(text(&out), more));
+    out.join("image.exr")
+}
+
+/// Two pictures of noise around grey.
+fn greys(folder: &TempDir, size: (usize, usize)) -> [PathBuf; 2] {
+    let pair = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+    pair.iter().zip(1..).for_each(|(path, seed)| grey_exr(path, size, seed, 0.4));
+    pair
+}
 
 // Long: one run, looked at from all sides
 #[test]
 fn two_renders_with_two_seeds() {
     let folder = tempdir().unwrap();
-    let render = |seed: &str, spp: &str| -> PathBuf {
-        let out = folder.path().join(format!("{seed}-{spp}"));
-        succeed(&tiny(text(&out), &["--seed", seed, "--criterion", spp]));
-        out.join("image.exr")
-    };
     let judge = |a: &PathBuf, b: &PathBuf, spp: &str, more: &[&str]| {
         let mut args =
             vec!["judge", text(a), "--spp", spp, "--against", text(b), "--spp", spp, "--tile", "32"];
@@ -21,7 +30,7 @@ fn two_renders_with_two_seeds() {
     };
 
     // As JSON: noisy at 16, and what is expected lies above
-    let noisy = [render("1", "spp:16"), render("2", "spp:16")];
+    let noisy = ["1", "2"].map(|seed| rendered(&folder, seed, &["--seed", seed, "--criterion", "spp:16"]));
     let report: Value = serde_json::from_str(&judge(&noisy[0], &noisy[1], "16", &["--json"])).unwrap();
     assert_eq!(
         (report["spp"].as_f64(), report["people"].as_f64().map(|t| t as f32)),
@@ -103,14 +112,13 @@ fn nested_stages_ask_for_what_independent_pictures_ask_for() {
 #[test]
 fn extreme_counts_and_sizes_are_judged() {
     let folder = tempdir().unwrap();
-    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
     for size in [(1, 1), (17, 16)] {
-        grey_exr(&a, size, 1, 0.4);
+        let [a, b] = greys(&folder, size);
         grey_exr(&b, size, 2, 0.5);
         for spp in ["1", "1e18", "0.001"] {
             let args = ["judge", text(&a), "--spp", spp, "--against", text(&b), "--spp", spp, "--json"];
             let args = [&args[..], &["--independent"]].concat();
-            let report: Value = serde_json::from_str(&succeed(&args)).unwrap();
+            let report = said_json(&args);
             assert!(report["tiles"][0]["probability"].as_f64().is_some(), "{report}");
         }
     }
@@ -120,11 +128,8 @@ fn extreme_counts_and_sizes_are_judged() {
 #[test]
 fn stages_of_one_rendering_are_told_from_independent_ones() {
     let folder = tempdir().unwrap();
-    let render = |name: &str, seed: &str, spp: &str| {
-        let out = folder.path().join(name);
-        succeed(&tiny(text(&out), &["--seed", seed, "--criterion", spp]));
-        out.join("image.exr")
-    };
+    let render =
+        |name: &str, seed: &str, spp: &str| rendered(&folder, name, &["--seed", seed, "--criterion", spp]);
     let (first, later, other) =
         (render("a", "1", "spp:64"), render("b", "1", "spp:80"), render("c", "2", "spp:80"));
     // Mean visible noise, and whether shared samples were found
@@ -153,11 +158,8 @@ fn stages_of_one_rendering_are_told_from_independent_ones() {
 #[test]
 fn our_own_files_say_what_they_are() {
     let folder = tempdir().unwrap();
-    let render = |name: &str, seed: &str, spp: &str| {
-        let out = folder.path().join(name);
-        succeed(&tiny(text(&out), &["--seed", seed, "--criterion", spp]));
-        out.join("image.exr")
-    };
+    let render =
+        |name: &str, seed: &str, spp: &str| rendered(&folder, name, &["--seed", seed, "--criterion", spp]);
     // Equal counts and a ratio of 25 show nothing, or too little, in pictures of 64×64 pixels
     let (first, later) = (render("a", "1", "spp:8"), render("b", "1", "spp:200"));
     let other = render("c", "2", "spp:200");
@@ -203,9 +205,7 @@ fn our_own_files_say_what_they_are() {
 #[test]
 fn viewing_conditions_are_said_and_checked() {
     let folder = tempdir().unwrap();
-    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
-    grey_exr(&a, (32, 32), 1, 0.4);
-    grey_exr(&b, (32, 32), 2, 0.4);
+    let [a, b] = greys(&folder, (32, 32));
     let judge = |more: &[&str]| {
         let pair = ["judge", text(&a), "--spp", "16", "--against", text(&b), "--spp", "16", "--json"];
         succeed(&[&pair[..], &["--independent"], more].concat())
@@ -234,21 +234,15 @@ fn pictures_of_different_things_are_not_judged() {
         pixels[pixel] = [1.0; 3];
     }
     write_exr(&mixed, &RenderLayers::rgb(32, 32, &pixels)).unwrap();
-    let args = |a: &PathBuf, b: &PathBuf| -> Vec<String> {
+    fn args<'a>(a: &'a Path, b: &'a Path) -> Vec<&'a str> {
         let all = ["judge", text(a), "--spp", "9", "--against", text(b), "--spp", "9", "--independent"];
-        let all = all.into_iter().chain(["--tone-mapping", "srgb", "--tile", "16", "--json"]);
-        all.map(str::to_owned).collect()
-    };
-    let refused = |a: &PathBuf, b: &PathBuf| {
-        let args = args(a, b);
-        fail(&args.iter().map(String::as_str).collect::<Vec<_>>(), &["differ in brightness", "everywhere"]);
-    };
-    refused(&black, &white);
-    refused(&white, &black);
-    refused(&grey, &white);
+        [&all[..], &["--tone-mapping", "srgb", "--tile", "16", "--json"]].concat()
+    }
+    for (a, b) in [(&black, &white), (&white, &black), (&grey, &white)] {
+        fail(&args(a, b), &["differ in brightness", "everywhere"]);
+    }
     let judged = |b: &PathBuf| -> (Vec<Value>, String) {
-        let args = args(&grey, b);
-        let output = run(&args.iter().map(String::as_str).collect::<Vec<_>>());
+        let output = run(&args(&grey, b));
         let report: Value = serde_json::from_slice(&output.stdout).unwrap();
         (report["tiles"].as_array().unwrap().clone(), stderr(&output))
     };
@@ -266,13 +260,10 @@ fn pictures_of_different_things_are_not_judged() {
 #[test]
 fn one_seed_is_dependent_whatever_else_differs() {
     let folder = tempdir().unwrap();
-    let render = |name: &str, more: &[&str]| {
-        let out = folder.path().join(name);
-        succeed(&tiny(text(&out), &[&["--criterion", "spp:64"], more].concat()));
-        out.join("image.exr")
-    };
-    let shallow = render("a", &["--seed", "1", "--max-depth", "3"]);
-    let [deep, other] = ["1", "2"].map(|seed| render(seed, &["--seed", seed, "--max-depth", "9"]));
+    let [shallow, deep, other] = [("1", "3"), ("1", "9"), ("2", "9")].map(|(seed, depth)| {
+        let more = ["--criterion", "spp:64", "--seed", seed, "--max-depth", depth];
+        rendered(&folder, &format!("{seed}-{depth}"), &more)
+    });
     let judge = ["judge", text(&shallow), "--tile", "32", "--against"];
     fail(&[&judge[..], &[text(&deep)]].concat(), &["seed 1", "same random numbers", "another seed"]);
     succeed(&[&judge[..], &[text(&other)]].concat());
@@ -283,9 +274,7 @@ fn one_seed_is_dependent_whatever_else_differs() {
 #[test]
 fn the_same_picture_twice_is_refused() {
     let folder = tempdir().unwrap();
-    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
-    grey_exr(&a, (32, 32), 1, 0.4);
-    grey_exr(&b, (32, 32), 2, 0.4);
+    let [a, b] = greys(&folder, (32, 32));
     let (a, b) = (text(&a), text(&b));
     let spp = ["--spp", "9", "--spp", "9", "--spp", "9", "--independent"];
     fail(
@@ -369,13 +358,10 @@ fn pictures_that_were_filtered_or_exposed_otherwise_are_noticed() {
 #[test]
 fn needs_of_less_than_a_sample_are_its_own() {
     let folder = tempdir().unwrap();
-    let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
-    grey_exr(&a, (64, 64), 1, 0.4);
-    grey_exr(&b, (64, 64), 2, 0.4);
+    let [a, b] = greys(&folder, (64, 64));
     let need = |spp: &str| {
         let args = ["judge", text(&a), "--against", text(&b), "--independent", "--tile", "64", "--json"];
-        let report: Value =
-            serde_json::from_str(&succeed(&[&args[..], &["--spp", spp, "--spp", spp]].concat())).unwrap();
+        let report = said_json(&[&args[..], &["--spp", spp, "--spp", spp]].concat());
         report["tiles"][0]["expected_spp"].as_f64().unwrap()
     };
     let (one, quarter) = (need("1"), need("0.25"));

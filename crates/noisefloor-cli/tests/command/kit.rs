@@ -1,23 +1,43 @@
 use noisefloor_image::{RenderLayers, write_exr};
+use noisefloor_testkit::HANG;
 use serde_json::Value;
+use std::fmt::Debug;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
 /// Commands of `noisefloor-lab`; all others are those of `noisefloor`.
 pub(crate) const LAB: [&str; 7] =
     ["train", "evaluate", "audience", "compare", "reproduce", "study", "explore"];
-pub(crate) fn command(args: &[&str]) -> Command {
-    let lab = args.first().is_some_and(|command| LAB.contains(command));
+pub(crate) fn command<S: AsRef<str>>(args: &[S]) -> Command {
+    let lab = args.first().is_some_and(|command| LAB.contains(&command.as_ref()));
     let program = if lab { env!("CARGO_BIN_EXE_noisefloor-lab") } else { env!("CARGO_BIN_EXE_noisefloor") };
     let mut command = Command::new(program);
-    command.args(args);
+    command.args(args.iter().map(AsRef::as_ref));
     // Whoever runs the tests may have calibrated their eyes
     command.env("XDG_CONFIG_HOME", "/nowhere").env("APPDATA", "/nowhere");
     command
 }
 
-pub(crate) fn run(args: &[&str]) -> Output {
+/// The words of a line without quotes.
+pub(crate) fn words(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
+}
+
+pub(crate) fn run<S: AsRef<str>>(args: &[S]) -> Output {
     command(args).output().unwrap()
+}
+
+/// Waits until something is so.
+pub(crate) fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(found) = found() {
+            return found;
+        }
+        assert!(began.elapsed() < HANG, "{what} did not happen");
+        std::thread::sleep(Duration::from_millis(5));
+    }
 }
 
 pub(crate) fn stderr(output: &Output) -> String {
@@ -25,7 +45,7 @@ pub(crate) fn stderr(output: &Output) -> String {
 }
 
 /// Runs what must succeed; its standard output.
-pub(crate) fn succeed(args: &[&str]) -> String {
+pub(crate) fn succeed<S: AsRef<str> + Debug>(args: &[S]) -> String {
     let output = run(args);
     assert!(output.status.success(), "{args:?}: {}\n{}", output.status, stderr(&output));
     String::from_utf8(output.stdout).unwrap()
@@ -33,7 +53,7 @@ pub(crate) fn succeed(args: &[&str]) -> String {
 
 /// Runs what must fail with exit code 1 and one line that has all of `words` in it. What clap refuses has
 /// exit code 2, and may say more.
-pub(crate) fn fail(args: &[&str], words: &[&str]) {
+pub(crate) fn fail<S: AsRef<str> + Debug>(args: &[S], words: &[&str]) {
     let output = run(args);
     let said = stderr(&output);
     assert!(!said.contains("panicked"), "{args:?} panicked:\n{said}");
@@ -88,6 +108,11 @@ pub(crate) fn channel(path: &Path, name: &str) -> Vec<f32> {
     let layers = exr::prelude::read_all_flat_layers_from_file(path).unwrap();
     let channels = &layers.layer_data[0].channel_data.list;
     channels.iter().find(|c| c.name.to_string() == name).unwrap().sample_data.values_as_f32().collect()
+}
+
+/// What is said as JSON.
+pub(crate) fn said_json(args: &[&str]) -> Value {
+    serde_json::from_str(&succeed(args)).unwrap()
 }
 
 /// An EXR of noise around grey, drawn from (seed, pixel); pixel 0 is `first`.

@@ -1,4 +1,4 @@
-use crate::kit::{column, fail, json, random, run, succeed, text};
+use crate::kit::{column, fail, json, random, run, said_json, succeed, text};
 use noisefloor::evidence::Evidence;
 use noisefloor_image::{RenderLayers, write_exr, write_png};
 use noisefloor_learn::read_table;
@@ -93,17 +93,9 @@ impl Corpora {
     }
 
     pub(crate) fn args<'a>(&'a self, command: &'a str) -> Vec<&'a str> {
-        vec![
-            command,
-            "--corpus",
-            text(&self.paths[0]),
-            "--corpus",
-            text(&self.paths[1]),
-            "--c",
-            "1",
-            "--gamma",
-            "0.01,0.03",
-        ]
+        let [means, batches] = self.paths.each_ref().map(|path| text(path));
+        let all = [command, "--corpus", means, "--corpus", batches];
+        [&all[..], &["--c", "1", "--gamma", "0.01,0.03"]].concat()
     }
 }
 
@@ -155,9 +147,7 @@ fn train_inspect_evaluate() {
     let table_args =
         ["train", "--table", text(&saved), "--c", "1", "--gamma", "0.01,0.03", "--out", text(&again)];
     succeed(&table_args);
-    let inspect = |model: &Path| -> Value {
-        serde_json::from_str(&succeed(&["inspect", text(model), "--json"])).unwrap()
-    };
+    let inspect = |model: &Path| -> Value { said_json(&["inspect", text(model), "--json"]) };
     let (one, two) = (inspect(&model), inspect(&again));
     assert_eq!(one["support_vectors"], two["support_vectors"]);
     assert_eq!(one["record"]["table_digest"], two["record"]["table_digest"]);

@@ -1,4 +1,4 @@
-use crate::kit::{fail, grey_exr, run, stderr, succeed, text};
+use crate::kit::{fail, grey_exr, run, said_json, stderr, succeed, text};
 use noisefloor_image::{Picture, RenderLayers, read_picture, write_exr, write_png};
 use serde_json::Value;
 use std::path::Path;
@@ -6,7 +6,7 @@ use tempfile::tempdir;
 
 fn measure(image: &Path, reference: &Path, more: &[&str]) -> Value {
     let args = [&["metrics", text(image), text(reference), "--json"], more].concat();
-    serde_json::from_str(&succeed(&args)).unwrap()
+    said_json(&args)
 }
 
 #[test]
@@ -33,15 +33,11 @@ fn maps_have_a_legend_beside_the_picture() {
     let path = |name: &str| folder.path().join(name);
     grey_exr(&path("a.exr"), (160, 150), 1, 0.4);
     grey_exr(&path("b.exr"), (160, 150), 2, 0.4);
-    let mut args = vec!["metrics".to_owned()];
-    args.extend(["a.exr", "b.exr"].map(|name| text(&path(name)).to_owned()));
-    let mut maps = vec![("--map", "jod.png")];
-    maps.extend([("--flip-map", "flip.png"), ("--butteraugli-map", "butteraugli.png")]);
-    for (option, name) in &maps {
-        args.extend([(*option).to_owned(), text(&path(name)).to_owned()]);
-    }
-    succeed(&args.iter().map(String::as_str).collect::<Vec<_>>());
-    for (_, name) in &maps {
+    let maps = ["jod.png", "flip.png", "butteraugli.png"];
+    let [a, b, jod, flip, butteraugli] = ["a.exr", "b.exr", maps[0], maps[1], maps[2]].map(path);
+    let more = ["--map", text(&jod), "--flip-map", text(&flip), "--butteraugli-map", text(&butteraugli)];
+    succeed(&[&["metrics", text(&a), text(&b)], &more[..]].concat());
+    for name in maps {
         let Picture::Display(map) = read_picture(path(name)).unwrap() else { panic!("a PNG") };
         assert!(map.width > 160 + 60 && map.height == 150, "{name}");
         // Letters are dark on the paper at the right

@@ -1,4 +1,4 @@
-use crate::kit::{command, fail, succeed, text};
+use crate::kit::{command, fail, succeed, text, wait_for, words};
 use noisefloor_image::{read_exr, read_picture};
 use noisefloor_testkit::HANG;
 use std::process::Stdio;
@@ -35,15 +35,10 @@ fn what_has_none_is_refused() {
 
     let stack = folder.path().join("stack");
     std::fs::create_dir(&stack).unwrap();
-    succeed(&[
-        "reference",
-        "cornell-box",
-        "--size",
-        "16x16",
-        "--quiet",
-        "--out",
-        text(&stack.join("00100.exr")),
-    ]);
+    succeed(&words(&format!(
+        "reference cornell-box --size 16x16 --quiet --out {}",
+        text(&stack.join("00100.exr"))
+    )));
     std::fs::remove_file(stack.join("00100.png")).unwrap();
     fail(&["reference", text(&stack), "--source", "exr", "--out", text(&out)], &["has no quick reference"]);
     assert!(!out.exists());
@@ -72,10 +67,7 @@ fn an_interrupt_gives_it_up() {
             let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
             u64::from_str_radix(mask.trim(), 16).unwrap() & 2 != 0
         };
-        while !catches() {
-            assert!(begun.elapsed() < HANG);
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        wait_for("its handler", || catches().then_some(()));
         std::thread::sleep(Duration::from_millis(500));
         assert!(std::process::Command::new("kill").args(["-INT", &id]).status().unwrap().success());
         let output = child.wait_with_output().unwrap();

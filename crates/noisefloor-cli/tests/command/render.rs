@@ -1,4 +1,4 @@
-use crate::kit::{FILES, column, json, succeed, table, text, tiny};
+use crate::kit::{FILES, column, json, succeed, table, text, tiny, words};
 use noisefloor_image::{Picture, read_exr, read_picture};
 use tempfile::tempdir;
 
@@ -177,17 +177,7 @@ fn scene_files_are_rendered() {
     assert_eq!((report["samples_dropped"].as_u64(), report["samples_clamped"].as_u64()), (Some(0), Some(0)));
 
     // With all that can be chosen; brighter samples than the walls give back are counted
-    args.extend([
-        "--sampler",
-        "sobol",
-        "--filter",
-        "gaussian",
-        "--clamp",
-        "0.5",
-        "--max-depth",
-        "3",
-        "--force",
-    ]);
+    args.extend(words("--sampler sobol --filter gaussian --clamp 0.5 --max-depth 3 --force"));
     succeed(&args);
     assert!(json(&out.join("report.json"))["samples_clamped"].as_u64() > Some(0));
 }

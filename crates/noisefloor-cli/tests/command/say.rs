@@ -60,8 +60,7 @@ impl Talkers {
 
 /// Runs with that as standard output: exit code, and what standard error says.
 fn run_into(args: &[String], stdout: impl Into<std::process::Stdio>, cache: &Path) -> (Option<i32>, String) {
-    let args: Vec<&str> = args.iter().map(String::as_str).collect();
-    let output = command(&args).stdout(stdout).env("XDG_CACHE_HOME", cache).output().unwrap();
+    let output = command(args).stdout(stdout).env("XDG_CACHE_HOME", cache).output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
 }
 

@@ -1,11 +1,10 @@
-use crate::kit::{FILES, command, fail, json, stderr, succeed, table, text};
+use crate::kit::{FILES, command, fail, json, stderr, succeed, table, text, wait_for, words};
 use crate::learn::Corpora;
 use noisefloor_image::{read_exr, read_picture};
-use noisefloor_testkit::HANG;
 use std::fs::File;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tempfile::tempdir;
 
 /// A render that would take days.
@@ -18,18 +17,6 @@ fn long(out: &Path, autosave: &str, stderr: Stdio) -> Child {
 
 fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
-}
-
-/// Waits until something is so.
-fn wait_for<T>(what: &str, mut test: impl FnMut() -> Option<T>) -> T {
-    let begun = Instant::now();
-    loop {
-        if let Some(found) = test() {
-            return found;
-        }
-        assert!(begun.elapsed() < HANG, "{what} did not happen");
-        std::thread::sleep(Duration::from_millis(20));
-    }
 }
 
 fn end(mut child: Child) -> ExitStatus {
@@ -82,19 +69,8 @@ fn what_was_saved_survives_a_kill() {
     assert!(table(&out.join("stops.csv")).1.iter().all(|row| row[7] == "open"));
 
     // And the next run overwrites it only if it is told to
-    let small = [
-        "render",
-        "--size",
-        "64x64",
-        "--tile",
-        "32",
-        "--criterion",
-        "spp:100",
-        "--quiet",
-        "--force",
-        "--out",
-    ];
-    succeed(&[&small[..], &[text(out)]].concat());
+    let small = "render --size 64x64 --tile 32 --criterion spp:100 --quiet --force --out";
+    succeed(&[words(small), vec![text(out)]].concat());
     assert_whole(out);
     assert_eq!(json(&out.join("report.json"))["complete"], true);
 }

@@ -1,5 +1,5 @@
-use crate::farm::{SCENE, assert_same, plan, render, shards, wait_for};
-use crate::kit::{command, json, stderr, text};
+use crate::farm::{SCENE, assert_same, plan, render, shards};
+use crate::kit::{command, json, stderr, text, wait_for};
 use noisefloor_testkit::{Requirement, require};
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -17,10 +17,6 @@ fn stack(out: &Path, more: &[&str]) -> Vec<String> {
     args.iter().chain(more).map(|&arg| arg.to_owned()).collect()
 }
 
-fn strs(args: &[String]) -> Vec<&str> {
-    args.iter().map(String::as_str).collect()
-}
-
 fn level(folder: &Path, spp: u64) -> Vec<[f32; 3]> {
     match read_picture(folder.join(format!("{spp:05}.exr"))).unwrap() {
         Picture::Linear(image) if (image.width, image.height) == (32, 32) => image.pixels,
@@ -33,7 +29,7 @@ fn level(folder: &Path, spp: u64) -> Vec<[f32; 3]> {
 fn a_stack_holds_what_renders_hold() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("stack");
-    assert!(succeed(&strs(&stack(&out, &[]))).contains("written to"));
+    assert!(succeed(&stack(&out, &[])).contains("written to"));
     // The levels, and the hidden lock
     assert_eq!(fs::read_dir(&out).unwrap().count(), LEVELS.len() + 1);
     let rendered = folder.path().join("render");
@@ -49,7 +45,7 @@ fn a_stack_holds_what_renders_hold() {
         assert!((a - b).abs() <= 1e-5 * a.abs().max(1.0), "{a} {b}");
     }
     let other = folder.path().join("other");
-    fail(&strs(&stack(&other, &["--levels", "4,4"])), &["at least two levels"]);
+    fail(&stack(&other, &["--levels", "4,4"]), &["at least two levels"]);
 }
 
 /// All levels but the reference pass through the program; what it does wrong is said, and leaves no level
@@ -59,18 +55,18 @@ fn a_stack_holds_what_renders_hold() {
 fn levels_are_denoised_by_any_program() {
     let folder = tempfile::tempdir().unwrap();
     let [plain, denoised, failed] = ["plain", "denoised", "failed"].map(|name| folder.path().join(name));
-    succeed(&strs(&stack(&plain, &[])));
+    succeed(&stack(&plain, &[]));
     // It is given the picture of 1 sample first, and answers with that of 16 always
     let clean = plain.join("00016.exr");
     let program =
         format!("sh -c 'test -s \"$1\" && /bin/cp \"$0\" \"$2.exr\"' '{}' {{in}} {{out}}", text(&clean));
-    succeed(&strs(&stack(&denoised, &["--denoise", &program])));
+    succeed(&stack(&denoised, &["--denoise", &program]));
     for spp in LEVELS {
         assert_eq!(level(&denoised, spp), level(&plain, 16), "{spp}");
     }
     let copy = "sh -c '/bin/cp \"$0\" \"$1.exr\"' {in} {out}";
     let copied = folder.path().join("copied");
-    succeed(&strs(&stack(&copied, &["--denoise", copy])));
+    succeed(&stack(&copied, &["--denoise", copy]));
     for spp in LEVELS {
         assert_eq!(level(&copied, spp), level(&plain, spp), "{spp}");
     }
@@ -78,7 +74,7 @@ fn levels_are_denoised_by_any_program() {
     let small = folder.path().join("small");
     let mut args = stack(&small, &[]);
     args[4] = "16x16".into();
-    succeed(&strs(&args));
+    succeed(&args);
     let resized =
         format!("sh -c '/bin/cp \"$0\" \"$1.exr\"' '{}' {{out}} {{in}}", text(&small.join("00001.exr")));
     for (program, words) in [
@@ -88,7 +84,7 @@ fn levels_are_denoised_by_any_program() {
         ("sh -c : {in} {out}", &["it wrote no file"]),
         (resized.as_str(), &["16×16", "given one of 32×32"]),
     ] {
-        fail(&strs(&stack(&failed, &["--denoise", program])), words);
+        fail(&stack(&failed, &["--denoise", program]), words);
     }
     // Nothing but the hidden lock
     let mut left = fs::read_dir(&failed).into_iter().flatten().map(|file| file.unwrap().file_name());
@@ -109,8 +105,8 @@ fn a_denoised_stack_goes_through_a_whole_study() {
         return;
     }
     let [plain, name] = ["plain", "stacks/denoised-cornell-box"].map(|name| folder.path().join(name));
-    succeed(&strs(&stack(&plain, &[])));
-    succeed(&strs(&stack(&name, &["--denoise", "oidn"])));
+    succeed(&stack(&plain, &[]));
+    succeed(&stack(&name, &["--denoise", "oidn"]));
     let error = |folder: &Path, spp: u64| -> f32 {
         let pairs = level(folder, spp).into_iter().zip(level(&plain, 16));
         pairs.map(|(p, t)| (p[1].min(1.0) - t[1].min(1.0)).powi(2)).sum()
@@ -135,7 +131,7 @@ struct Answered {
 impl Answered {
     fn new(observers: &str) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        succeed(&strs(&stack(&dir.path().join("box"), &[])));
+        succeed(&stack(&dir.path().join("box"), &[]));
         let file = dir.path().join("study.toml");
         let design = "protocol = \"acquisition\"\ndatabase = \"answers.sqlite\"\ntile = 16\nrepeats = 1\n\
             [text.en]\ntitle = \"A box\"\nconsent = \"I take part.\"\n\

@@ -1,6 +1,5 @@
-use crate::kit::{fail, json, succeed, text, tiny};
+use crate::kit::{fail, json, said_json, succeed, text, tiny};
 use noisefloor_image::{Picture, RenderLayers, read_exr, read_picture, write_exr};
-use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use tempfile::tempdir;
@@ -27,9 +26,7 @@ fn metrics_see_what_a_lut_shows() {
     let measure = |more: &[&str]| {
         let (a, b) = (path("a.exr"), path("b.exr"));
         let args = ["metrics", text(&a), text(&b), "--json", "--tone-mapping", &tone];
-        serde_json::from_str::<Value>(&succeed(&[&args[..], more].concat())).unwrap()["psnr"]
-            .as_f64()
-            .unwrap()
+        said_json(&[&args[..], more].concat())["psnr"].as_f64().unwrap()
     };
     // √(1/4) and √(1/16): a quarter apart; with four times the light, a half
     assert!((measure(&[]) - 20.0 * 4f64.log10()).abs() < 0.01);
@@ -55,12 +52,9 @@ fn a_render_is_shown_through_its_lut_and_resumed_with_its_content() {
         let what = ["--criterion", "spp:1500", "--tone-mapping", tone, "--out", text(&out)];
         [&size[..], &what, more].concat().into_iter().map(str::to_owned).collect()
     };
-    fn words(args: &[String]) -> Vec<&str> {
-        args.iter().map(String::as_str).collect()
-    }
-    succeed(&words(&render(&one, &["--time", "0.01"])));
-    fail(&words(&render(&other, &["--resume"])), &["its tone curve", "give the LUT that it had"]);
-    succeed(&words(&render(&same, &["--resume", "--time", "0.01"])));
+    succeed(&render(&one, &["--time", "0.01"]));
+    fail(&render(&other, &["--resume"]), &["its tone curve", "give the LUT that it had"]);
+    succeed(&render(&same, &["--resume", "--time", "0.01"]));
 
     // image.png is what the LUT makes of image.exr
     let linear = read_exr(out.join("image.exr")).unwrap().pixels;

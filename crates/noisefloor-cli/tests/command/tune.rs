@@ -1,4 +1,4 @@
-use crate::kit::{command, fail, json, stderr, succeed, text};
+use crate::kit::{command, fail, json, said_json, stderr, succeed, text, words};
 use noisefloor_testkit::require_python;
 use serde_json::Value;
 use tempfile::tempdir;
@@ -10,16 +10,7 @@ const SMALL: [&str; 5] = ["tune", "cornell-box", "--size", "64x64", "--quiet"];
 fn samples_that_were_found_are_enough_for_other_seeds() {
     let folder = tempdir().unwrap();
     let keep = folder.path().join("kept");
-    let report: Value = serde_json::from_str(&succeed(&[
-        "tune",
-        "cornell-box",
-        "--size",
-        "64x64",
-        "--json",
-        "--keep",
-        text(&keep),
-    ]))
-    .unwrap();
+    let report = said_json(&["tune", "cornell-box", "--size", "64x64", "--json", "--keep", text(&keep)]);
     assert_eq!((report["ending"].as_str(), report["knob"].as_str()), (Some("found"), Some("samples")));
     let (setting, coarse) = (report["setting"].as_f64().unwrap(), report["too_coarse"].as_f64().unwrap());
     assert!(coarse < setting, "{report}");
@@ -40,23 +31,14 @@ fn samples_that_were_found_are_enough_for_other_seeds() {
     let pictures = ["11", "12"].map(|seed| {
         let out = folder.path().join(seed);
         let spp = format!("spp:{setting}");
-        succeed(&[
-            "render",
-            "cornell-box",
-            "--size",
-            "64x64",
-            "--criterion",
-            &spp,
-            "--seed",
-            seed,
-            "--out",
-            text(&out),
-            "--quiet",
-        ]);
+        succeed(&words(&format!(
+            "render cornell-box --size 64x64 --criterion {spp} --seed {seed} --out {} --quiet",
+            text(&out)
+        )));
         out.join("image.exr")
     });
     let [a, b] = pictures.each_ref().map(|path| text(path));
-    let judged: Value = serde_json::from_str(&succeed(&["judge", a, "--against", b, "--json"])).unwrap();
+    let judged = said_json(&["judge", a, "--against", b, "--json"]);
     for tile in judged["tiles"].as_array().unwrap() {
         let needs = tile["expected_spp"].as_f64().unwrap();
         assert!(needs <= 1.35 * setting, "{needs} of {setting}: {tile}");
@@ -203,17 +185,8 @@ fn a_setting_for_a_sequence_is_that_of_its_hardest_frame() {
     assert_eq!(done["setting"], all["setting"]);
     assert_eq!(std::fs::read_to_string(&asked).unwrap(), "");
     // And another is not it
-    let base = [
-        "tune",
-        text(&scene),
-        "--source",
-        &source,
-        "--tone-mapping",
-        "srgb",
-        "--keep",
-        text(&keep),
-        "--resume",
-    ];
+    let base = ["tune", text(&scene), "--source", &source, "--tone-mapping", "srgb", "--resume"];
+    let base = [&base[..], &["--keep", text(&keep)]].concat();
     fail(&[&base[..], &["--frames", "1,2,3", "--seed", "9"]].concat(), &["cannot be resumed", "--force"]);
     fail(&[&base[..], &["--frames", "1,2"]].concat(), &["other frames", "--force"]);
     fail(&["tune", "cornell-box", "--frames", "1,2"], &["{frame}"]);
@@ -288,7 +261,7 @@ fn only_the_worst_places_are_looked_at_again() {
 #[test]
 fn samples_are_found_in_the_worst_place_alone() {
     let args = ["tune", "cornell-box", "--size", "256x128", "--json"];
-    let search = |more: &[&str]| serde_json::from_str::<Value>(&succeed(&[&args, more].concat())).unwrap();
+    let search = |more: &[&str]| said_json(&[&args, more].concat());
     let (all, some) = (search(&[]), search(&["--regions", "1"]));
     assert_eq!(some["regions"].as_array().unwrap().len(), 1, "{some}");
     // The crop is judged as a picture of its own

@@ -1,26 +1,26 @@
-//! What can be typed, one file a command. Each command's arguments become a checked job; nothing typed goes
-//! further.
+//! What can be typed, one file a command. Where checking makes something else of it, arguments become a job;
+//! nothing typed goes further.
 
-mod audience;
+pub mod audience;
 mod compare;
 mod data;
 mod evaluate;
 mod explore;
 mod reproduce;
-mod study;
+pub mod study;
 mod train;
 
-pub use audience::AudienceArgs;
 pub use compare::CompareArgs;
 pub use evaluate::EvaluateArgs;
 pub use explore::ExploreArgs;
 pub use reproduce::ReproduceArgs;
-pub use study::StudyArgs;
 pub use train::TrainArgs;
 
+use audience::AudienceArgs;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use std::path::PathBuf;
+use study::StudyArgs;
 
 /// Trains the models of noisefloor, compares stopping criteria, and asks people.
 ///

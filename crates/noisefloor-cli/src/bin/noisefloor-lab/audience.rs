@@ -1,12 +1,13 @@
 //! `noisefloor-lab audience`.
 
+use crate::args::audience::{AudienceArgs, AudienceCommand, FitArgs};
 use anyhow::{Context, bail};
 use csv::{ReaderBuilder, Trim};
 use noisefloor::Audience;
 use noisefloor_cli::say::{say, say_json};
 use noisefloor_learn::{AudienceFit, MAX_PAIRS};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Columns of the pairs.
 const COLUMNS: [&str; 2] = ["observers", "audience"];
@@ -21,17 +22,12 @@ struct Report {
     argument: String,
 }
 
-/// A table of pairs to fit a line to.
-pub struct FitJob {
-    pub file: PathBuf,
-    pub json: bool,
-}
-
-pub fn fit(job: &FitJob) -> anyhow::Result<()> {
-    let fit = AudienceFit::new(&read(&job.file)?).with_context(|| job.file.display().to_string())?;
+pub fn run(args: AudienceArgs) -> anyhow::Result<()> {
+    let AudienceCommand::Fit(FitArgs { file, json }) = args.command;
+    let fit = AudienceFit::new(&read(&file)?).with_context(|| file.display().to_string())?;
     let Audience { slope, offset } = fit.line;
     let argument = format!("{slope:.4},{offset:.2}");
-    if job.json {
+    if json {
         return say_json(&Report { fit, argument });
     }
     let sign = if offset < 0.0 { '-' } else { '+' };

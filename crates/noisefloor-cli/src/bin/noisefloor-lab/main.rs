@@ -31,12 +31,12 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     let done = |()| ExitCode::SUCCESS;
     match command {
         Command::Compare(args) => compare::run(args.check()?),
-        Command::Reproduce(args) => reproduce::run(&args.check()).map(done),
+        Command::Reproduce(args) => reproduce::run(args).map(done),
         Command::Train(args) => train::run(&args.check()?).map(done),
         Command::Evaluate(args) => evaluate::run(&args.check()?).map(done),
-        Command::Audience(args) => audience::fit(&args.check()).map(done),
+        Command::Audience(args) => audience::run(args).map(done),
         Command::Explore(args) => explore::run(args.check()?).map(done),
-        Command::Study(args) => study::run(args.check()?).map(done),
+        Command::Study(args) => study::run(args.command).map(done),
         Command::Completions { shell } => manual::completions(Cli::command(), shell).map(done),
         Command::Man { dir } => manual::man(Cli::command(), &dir).map(done),
     }

@@ -3,6 +3,10 @@
 mod report;
 mod stack;
 
+use crate::args::study::{
+    AnalyseArgs, BackupArgs, DataFolderArgs, LinksArgs, ObserverArgs, ServeArgs, SimulateArgs, StudyCommand,
+    ThresholdChoice,
+};
 use anyhow::Context;
 use noisefloor_cli::say::{say, say_json};
 use noisefloor_pages::http::{Exposure, interrupted};
@@ -10,105 +14,59 @@ use noisefloor_study::analysis::files::write;
 use noisefloor_study::analysis::raw::write_raw;
 use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold, analyse};
 use noisefloor_study::simulated::{Public, drive};
-use noisefloor_study::{Study, StudyServer, store};
-pub use stack::{StackDenoiser, StackJob};
+use noisefloor_study::{Study, StudyServer, parse_code, store};
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::oneshot;
 
-/// What to do with a study: checked.
-pub enum StudyJob {
-    Stack(StackJob),
-    Serve(ServeJob),
-    Analyse(AnalyseJob),
-    Simulate(SimulateJob),
-    Links(LinksJob),
-    Data(DataFolderJob),
-    Backup(BackupJob),
-    Export(ObserverJob),
-    Erase(ObserverJob),
-}
-
-pub struct ServeJob {
-    /// All its pictures can be shown.
-    pub study: Arc<Study>,
-    pub address: SocketAddr,
-    /// Names, proxies and the path that the server answers to.
-    pub exposure: Exposure,
-    pub admit_simulated: bool,
-}
-
-pub struct AnalyseJob {
-    pub study: Arc<Study>,
-    pub out: PathBuf,
-    pub options: AnalysisOptions,
-    pub threshold: CorpusThreshold,
-}
-
-pub struct SimulateJob {
-    /// All its pictures can be shown.
-    pub study: Arc<Study>,
-    pub observers: u16,
-    /// Standard deviation of ln(threshold) between people in one place.
-    pub spread: f64,
-    pub seed: u64,
-}
-
-pub struct LinksJob {
-    pub study: Study,
-    pub count: u32,
-    pub url: String,
-}
-
-pub struct DataFolderJob {
-    pub study: Arc<Study>,
-    pub out: PathBuf,
-    pub simulated: bool,
-}
-
-pub struct BackupJob {
-    pub study: Study,
-    pub to: PathBuf,
-}
-
-pub struct ObserverJob {
-    pub study: Study,
-    /// In its canonical form.
-    pub code: String,
-}
-
-pub fn run(job: StudyJob) -> anyhow::Result<()> {
-    match job {
-        StudyJob::Stack(job) => stack::render(&job),
-        StudyJob::Serve(job) => serve(job),
-        StudyJob::Analyse(job) => analysis(&job),
-        StudyJob::Simulate(job) => simulate(&job),
-        StudyJob::Links(job) => links(&job),
-        StudyJob::Data(job) => data(&job),
-        StudyJob::Backup(job) => backup(&job),
-        StudyJob::Export(ObserverJob { study, code }) => {
-            let record = store::read_one(&study.database, &study.design(), &code)?;
-            say_json(&record)
+pub fn run(command: StudyCommand) -> anyhow::Result<()> {
+    match command {
+        StudyCommand::Stack(args) => stack::render(args),
+        StudyCommand::Serve(args) => serve(&args),
+        StudyCommand::Analyse(args) => analysis(&args),
+        StudyCommand::Simulate(args) => simulate(&args),
+        StudyCommand::Links(args) => links(&args),
+        StudyCommand::Data(args) => data(&args),
+        StudyCommand::Backup(args) => backup(&args),
+        StudyCommand::Export(args) => {
+            let (study, code) = observer(&args)?;
+            say_json(&store::read_one(&study.database, &study.design(), &code)?)
         }
-        StudyJob::Erase(ObserverJob { study, code }) => {
+        StudyCommand::Erase(args) => {
+            let (study, code) = observer(&args)?;
             store::erase_one(&study.database, &study.design(), &code)?;
-            say!("everything about {code} has been erased")?;
-            Ok(())
+            Ok(say!("everything about {code} has been erased")?)
         }
     }
+}
+
+/// A study all of whose pictures can be shown.
+fn complete(path: &Path) -> anyhow::Result<Arc<Study>> {
+    let study = Study::open(path)?;
+    study.check_pictures()?;
+    Ok(Arc::new(study))
+}
+
+/// A study, and the code of one of its observers in its canonical form.
+fn observer(args: &ObserverArgs) -> anyhow::Result<(Study, String)> {
+    let code = parse_code(&args.code)
+        .with_context(|| format!("{:?} cannot be a code: a code has twelve letters and digits", args.code))?;
+    Ok((Study::open(&args.study)?, code))
 }
 
 fn runtime() -> anyhow::Result<Runtime> {
     Builder::new_multi_thread().enable_all().build().context("no threads for the server")
 }
 
-fn serve(job: ServeJob) -> anyhow::Result<()> {
-    let ServeJob { study, address, exposure, admit_simulated } = job;
+fn serve(args: &ServeArgs) -> anyhow::Result<()> {
+    let study = complete(&args.study)?;
+    let address = SocketAddr::new(args.listen, args.port);
+    let exposure = Exposure::named(&args.allow_host).trusting(&args.trust_proxy).under(&args.base_path);
     runtime()?.block_on(async {
         let server = StudyServer::bind(study.clone(), address, &exposure).await?;
-        let server = if admit_simulated { server.admitting_simulated() } else { server };
+        let server = if args.admit_simulated { server.admitting_simulated() } else { server };
         let address = server.address();
         say!("observers begin at http://{address}{}; Ctrl-C ends the server", exposure.base_path)?;
         say!("experimenter's page: http://{address}{}", server.experimenter_path())?;
@@ -118,17 +76,23 @@ fn serve(job: ServeJob) -> anyhow::Result<()> {
     })
 }
 
-fn analysis(job: &AnalyseJob) -> anyhow::Result<()> {
-    let report = analyse(&job.study, job.options)?;
-    write(&job.out, &job.study, &report, job.threshold)?;
+fn analysis(args: &AnalyseArgs) -> anyhow::Result<()> {
+    let study = Arc::new(Study::open(&args.study)?);
+    let AnalyseArgs { keep_excluded, seed, simulated, .. } = *args;
+    let report = analyse(&study, AnalysisOptions { keep_excluded, seed, simulated })?;
+    let threshold = match args.threshold {
+        ThresholdChoice::Level95 => CorpusThreshold::Level95,
+        ThresholdChoice::Mean => CorpusThreshold::Mean,
+    };
+    write(&args.out, &study, &report, threshold)?;
     report::say_all(&report)?;
-    say!("written to {}", job.out.display())?;
+    say!("written to {}", args.out.display())?;
     Ok(())
 }
 
-fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
-    let study = &job.study;
-    let public = Public::made_up(study).spread_by(job.spread);
+fn simulate(args: &SimulateArgs) -> anyhow::Result<()> {
+    let study = &complete(&args.study)?;
+    let public = Public::made_up(study).spread_by(args.spread);
     let runtime = runtime()?;
     let (stop, stopped) = oneshot::channel::<()>();
     let address = SocketAddr::new(Ipv4Addr::LOCALHOST.into(), 0);
@@ -137,9 +101,9 @@ fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
     let url = format!("http://{}", server.address());
     let served = runtime.spawn(server.run(async { drop(stopped.await) }));
     let mut events = 0u64;
-    for i in 0..u64::from(job.observers) {
+    for i in 0..u64::from(args.observers) {
         let group = study.groups.get(i as usize % study.groups.len().max(1)).map_or("", String::as_str);
-        let mut observer = public.draw(job.seed.wrapping_mul(1000).wrapping_add(i));
+        let mut observer = public.draw(args.seed.wrapping_mul(1000).wrapping_add(i));
         let code = drive(&url, group, &mut observer, |_| events += 1)?;
         say!("simulated observer {}: {code}", i + 1)?;
     }
@@ -157,15 +121,16 @@ fn simulate(job: &SimulateJob) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn links(job: &LinksJob) -> anyhow::Result<()> {
-    for token in store::make_links(&job.study.database, &job.study.design(), job.count)? {
-        say!("{}?link={token}", job.url)?;
+fn links(args: &LinksArgs) -> anyhow::Result<()> {
+    let study = Study::open(&args.study)?;
+    for token in store::make_links(&study.database, &study.design(), args.count)? {
+        say!("{}?link={token}", args.url)?;
     }
     Ok(())
 }
 
-fn data(job: &DataFolderJob) -> anyhow::Result<()> {
-    let DataFolderJob { study, out, simulated } = job;
+fn data(DataFolderArgs { study, out, simulated }: &DataFolderArgs) -> anyhow::Result<()> {
+    let study = &Arc::new(Study::open(study)?);
     let options = AnalysisOptions { keep_excluded: false, seed: 1, simulated: *simulated };
     let report = analyse(study, options)?;
     let mut records = store::read_all(&study.database, &study.design())?;
@@ -175,8 +140,9 @@ fn data(job: &DataFolderJob) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn backup(job: &BackupJob) -> anyhow::Result<()> {
-    store::back_up(&job.study.database, &job.study.design(), &job.to)?;
-    say!("copied to {}", job.to.display())?;
+fn backup(BackupArgs { study, to }: &BackupArgs) -> anyhow::Result<()> {
+    let study = Study::open(study)?;
+    store::back_up(&study.database, &study.design(), to)?;
+    say!("copied to {}", to.display())?;
     Ok(())
 }

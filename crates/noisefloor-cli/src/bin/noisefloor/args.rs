@@ -1,11 +1,11 @@
-//! What can be typed, one file a command. Each command's arguments become a checked job; nothing typed goes
-//! further.
+//! What can be typed, one file a command. Where checking makes something else of it, arguments become a job;
+//! nothing typed goes further.
 
 mod audit;
 mod calibrate;
 mod config;
 mod doctor;
-mod farm;
+pub mod farm;
 mod inspect;
 mod judge;
 mod metrics;
@@ -19,7 +19,7 @@ pub use audit::AuditArgs;
 pub use calibrate::CalibrateArgs;
 pub use config::expand;
 pub use doctor::DoctorArgs;
-pub use farm::FarmArgs;
+use farm::FarmArgs;
 pub use inspect::InspectArgs;
 pub use judge::JudgeArgs;
 pub use metrics::MetricsArgs;

@@ -1,17 +1,12 @@
 //! `noisefloor doctor`.
 
+use crate::args::DoctorArgs;
 use noisefloor_cli::say::{note, say, say_json};
 use noisefloor_cli::sources::ADAPTERS;
 use noisefloor_denoise::OIDN;
 use noisefloor_sidecar::{Renderer, SetupError, find, gpus, install, probe};
 use serde::Serialize;
 use std::process::ExitCode;
-
-/// What to look at, or to install.
-pub struct DoctorJob {
-    pub install: Option<&'static Renderer>,
-    pub json: bool,
-}
 
 /// One line of the table, and what is to be said below it.
 #[derive(Serialize)]
@@ -26,8 +21,8 @@ struct Row {
     broken: bool,
 }
 
-pub fn run(job: &DoctorJob) -> anyhow::Result<ExitCode> {
-    if let Some(renderer) = job.install {
+pub fn run(args: &DoctorArgs) -> anyhow::Result<ExitCode> {
+    if let Some(renderer) = args.install {
         let python = install(renderer, |line| note!("{line}"))?;
         say!("{} is installed: {}", renderer.title, python.display())?;
         for text in notes(renderer) {
@@ -42,7 +37,7 @@ pub fn run(job: &DoctorJob) -> anyhow::Result<ExitCode> {
     let others = renderers.map(|adapter| adapter.renderer).chain([&OIDN]);
     let rows: Vec<Row> = std::iter::once(ptwne).chain(others.map(examine)).collect();
     let ended = if rows.iter().any(|row| row.broken) { ExitCode::FAILURE } else { ExitCode::SUCCESS };
-    if job.json {
+    if args.json {
         say_json(&rows)?;
         return Ok(ended);
     }

@@ -1,8 +1,9 @@
 //! `noisefloor farm`: what a farm needs of this command, and what it says.
 
+use crate::args::farm::{FarmCommand, MergeArgs, PlanArgs, RunArgs, StatusArgs, StepArgs, TaskArgs};
 use crate::job::{CriterionJob, Ready, RenderJob};
-use crate::output::{self, Output};
-use crate::render::{EACH, JOB, KeyExposure, ONE_SEED, SequenceExposure, eased, exposure_of};
+use crate::output::{self, About, Output};
+use crate::render::{EACH, JOB, KeyExposure, ONE_SEED, eased, exposure_of};
 use anyhow::{Context, bail};
 use indicatif::HumanDuration;
 use noisefloor::driver::{Clock, Progress};
@@ -12,9 +13,9 @@ use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::say::{NotSaid, one_line, say_json};
 use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::sources::{Resources, SourceKind};
-use noisefloor_cli::{note, say};
+use noisefloor_cli::{note, refuse, say};
 use noisefloor_farm::{
-    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameSource, FrameState, Frames, News,
+    Coordinator, Farm, FarmPlan, Finished, FrameJob, FrameProgress, FrameSource, FrameState, News,
     RenderFiles, Round, Slurm, Studio, StudioError, merge_shards,
 };
 use serde::{Deserialize, Serialize};
@@ -28,39 +29,6 @@ use std::time::Duration;
 /// What is missing is named so far.
 const MOST_NAMED: usize = 5;
 
-/// What a farm is asked to do: checked.
-pub enum FarmTask {
-    Plan(Box<PlanTask>),
-    Run(RunTask),
-    Merge(MergeTask),
-    Status { dir: PathBuf, json: bool },
-    Task { dir: PathBuf, round: usize, task: usize },
-    Step { dir: PathBuf, round: usize, sbatch: Vec<String> },
-}
-
-pub struct PlanTask {
-    pub dir: PathBuf,
-    pub frames: Option<Frames>,
-    pub tasks: usize,
-    pub keep: bool,
-    /// None to plan the next round of what is there.
-    pub render: Option<(FarmRender, SequenceExposure)>,
-}
-
-pub struct RunTask {
-    pub dir: PathBuf,
-    pub local: Option<usize>,
-    pub sbatch: Vec<String>,
-    pub wait: bool,
-    pub every: Duration,
-    pub quiet: bool,
-}
-
-pub enum MergeTask {
-    Farm(PathBuf),
-    Shards { shards: Vec<PathBuf>, out: PathBuf, force: bool },
-}
-
 /// A render that machines share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FarmRender {
@@ -71,10 +39,6 @@ pub struct FarmRender {
 }
 
 impl FarmRender {
-    pub fn new(job: RenderJob, resources: Resources) -> anyhow::Result<Self> {
-        Ok(Self { job, resources, program: program_digest()? })
-    }
-
     fn check_program(&self) -> anyhow::Result<()> {
         let here = program_digest()?;
         anyhow::ensure!(
@@ -95,14 +59,14 @@ struct Here {
     warned: Cell<bool>,
 }
 
-pub fn run(task: FarmTask) -> anyhow::Result<ExitCode> {
-    match task {
-        FarmTask::Plan(task) => plan(*task),
-        FarmTask::Run(task) => rounds(task),
-        FarmTask::Merge(task) => merge(&task),
-        FarmTask::Status { dir, json } => status(&dir, json),
-        FarmTask::Task { dir, round, task } => deliver(&dir, round, task),
-        FarmTask::Step { dir, round, sbatch } => step(&dir, round, sbatch),
+pub fn run(command: FarmCommand) -> anyhow::Result<ExitCode> {
+    match command {
+        FarmCommand::Plan(args) => plan(args),
+        FarmCommand::Run(args) => rounds(args),
+        FarmCommand::Merge(args) => merge(args),
+        FarmCommand::Status(args) => status(&args),
+        FarmCommand::Task(args) => deliver(&args),
+        FarmCommand::Step(args) => step(args),
     }
 }
 
@@ -120,16 +84,20 @@ fn absolute(dir: &Path) -> anyhow::Result<PathBuf> {
     std::path::absolute(dir).with_context(|| dir.display().to_string())
 }
 
-fn plan(PlanTask { dir, frames, tasks, keep, render }: PlanTask) -> anyhow::Result<ExitCode> {
+fn plan(args: PlanArgs) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
-    if let Some((render, exposure)) = render {
+    let render = args.render()?;
+    let PlanArgs { dir, frames, tasks, keep_shards, .. } = args;
+    if let Some((job, resources, exposure)) = render {
+        check(&job)?;
+        let render = FarmRender { job, resources, program: program_digest()? };
         if frames.is_some() && exposure.frames().is_empty() && render.job.tone.settles() {
             note!("warning: {EACH}");
         }
         if frames.is_some() && render.job.source.same_seed {
             note!("warning: {ONE_SEED}");
         }
-        let plan = FarmPlan::new(render, frames, tasks, keep).with_first(exposure.frames().to_vec());
+        let plan = FarmPlan::new(render, frames, tasks, keep_shards).with_first(exposure.frames().to_vec());
         Farm::plan(&here, &absolute(&dir)?, plan)?;
     }
     let round = here.farm(&dir)?.claim()?.next_round()?;
@@ -137,7 +105,7 @@ fn plan(PlanTask { dir, frames, tasks, keep, render }: PlanTask) -> anyhow::Resu
     Ok(ExitCode::SUCCESS)
 }
 
-fn rounds(RunTask { dir, local, sbatch, wait, every, quiet }: RunTask) -> anyhow::Result<ExitCode> {
+fn rounds(RunArgs { dir, local, sbatch, wait, every, quiet }: RunArgs) -> anyhow::Result<ExitCode> {
     let here = Here::new(quiet);
     let coordinator = here.farm(&dir)?.claim()?;
     coordinator.begin()?;
@@ -145,7 +113,7 @@ fn rounds(RunTask { dir, local, sbatch, wait, every, quiet }: RunTask) -> anyhow
         let cancel = Arc::new(AtomicBool::new(false));
         let says = "stopping once the tasks under way have written what they have; `farm run` continues";
         cancel_on_signal(Arc::clone(&cancel), says)?;
-        let done = coordinator.run_local(&program()?, processes, || cancel.load(Ordering::Relaxed))?;
+        let done = coordinator.run_local(&program()?, processes.get(), || cancel.load(Ordering::Relaxed))?;
         return if done { finished(&here, &dir) } else { Ok(ExitCode::from(INTERRUPTED)) };
     }
     let slurm = Slurm { program: program()?, options: sbatch };
@@ -160,12 +128,12 @@ fn rounds(RunTask { dir, local, sbatch, wait, every, quiet }: RunTask) -> anyhow
 }
 
 /// What follows a round on Slurm.
-fn step(dir: &Path, round: usize, sbatch: Vec<String>) -> anyhow::Result<ExitCode> {
+fn step(StepArgs { dir, round, sbatch }: StepArgs) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
     let own = std::env::var("SLURM_JOB_ID").ok();
     let slurm = Slurm { program: program()?, options: sbatch };
-    let submitted = Coordinator::step(here.farm(dir)?, round, own.as_deref(), &slurm)?;
-    if submitted { Ok(ExitCode::SUCCESS) } else { finished(&here, dir) }
+    let submitted = Coordinator::step(here.farm(&dir)?, round, own.as_deref(), &slurm)?;
+    if submitted { Ok(ExitCode::SUCCESS) } else { finished(&here, &dir) }
 }
 
 fn finished(here: &Here, dir: &Path) -> anyhow::Result<ExitCode> {
@@ -178,10 +146,10 @@ fn finished(here: &Here, dir: &Path) -> anyhow::Result<ExitCode> {
 }
 
 /// Takes the samples of one task. Interrupted, it writes those that it has.
-fn deliver(dir: &Path, round: usize, task: usize) -> anyhow::Result<ExitCode> {
+fn deliver(TaskArgs { dir, round, task }: &TaskArgs) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
     let farm = here.farm(dir)?;
-    let order = farm.order(round, task)?;
+    let order = farm.order(*round, *task)?;
     let FarmRender { job, resources, .. } = &order.job;
     order.job.check_program()?;
     resources.start_threads()?;
@@ -196,18 +164,18 @@ fn deliver(dir: &Path, round: usize, task: usize) -> anyhow::Result<ExitCode> {
     Ok(if delivered.batches == delivered.of { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn merge(task: &MergeTask) -> anyhow::Result<ExitCode> {
+fn merge(MergeArgs { paths, out, force }: MergeArgs) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
-    let (shards, out, force) = match task {
-        MergeTask::Farm(dir) => {
-            for (frame, state) in here.farm(dir)?.claim()?.merge()? {
-                say_frame(&frame, None, &state)?;
-            }
-            return Ok(ExitCode::SUCCESS);
+    let Some(out) = out else {
+        let [dir] = paths.as_slice() else {
+            refuse!("one folder of a farm, or shards and --out for their picture")
+        };
+        for (frame, state) in here.farm(dir)?.claim()?.merge()? {
+            say_frame(&frame, None, &state)?;
         }
-        MergeTask::Shards { shards, out, force } => (shards, out, *force),
+        return Ok(ExitCode::SUCCESS);
     };
-    let merged = merge_shards(&here, shards, out, force)?;
+    let merged = merge_shards(&here, &paths, &out, force)?;
     let done = merged.tiles - merged.missing.len();
     say!(
         "{} batches of {} shards, {done} of {} tiles done; written to {}",
@@ -289,11 +257,11 @@ impl Studio for Here {
     ) -> Result<Box<dyn RenderFiles>, StudioError> {
         let FrameJob { scene, source, .. } = frame;
         let (folder, earlier) = (Folder::claim(folder.to_owned())?, Earlier::of(force, false));
-        let mut output =
-            Output::create(folder, earlier, scene.clone(), source.clone(), render.job.clone(), false)?;
+        let model = render.job.read()?.oracle.map(|oracle| oracle.model().digest());
+        let about = About::new(scene.clone(), source.clone(), &render.job, model);
+        let mut output = Output::create(folder, earlier, about, false)?;
         // Only sources that repeat their samples are on a farm
         output.origin = render.job.source.origin(scene, source, true)?;
-        output.model = render.job.read()?.oracle.map(|oracle| oracle.model().digest());
         Ok(Box::new(output))
     }
 
@@ -353,7 +321,7 @@ impl RenderFiles for Output {
 }
 
 /// What a farm cannot do.
-pub fn check(job: &RenderJob) -> anyhow::Result<()> {
+fn check(job: &RenderJob) -> anyhow::Result<()> {
     if job.source.kind == SourceKind::Exr {
         bail!(
             "pictures on disk hold the batches that they hold, and a farm plans others; \
@@ -368,10 +336,10 @@ pub fn check(job: &RenderJob) -> anyhow::Result<()> {
     }
 }
 
-fn status(dir: &Path, json: bool) -> anyhow::Result<ExitCode> {
+fn status(StatusArgs { dir, json }: &StatusArgs) -> anyhow::Result<ExitCode> {
     let here = Here::new(false);
     let progress = here.farm(dir)?.progress()?;
-    if json {
+    if *json {
         say_json(&progress)?;
         return Ok(ExitCode::SUCCESS);
     }

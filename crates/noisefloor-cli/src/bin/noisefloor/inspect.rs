@@ -1,5 +1,6 @@
 //! `noisefloor inspect` and `noisefloor scenes`.
 
+use crate::args::InspectArgs;
 use noisefloor::oracle::Spread;
 use noisefloor::svm::Machine;
 use noisefloor::{
@@ -8,14 +9,10 @@ use noisefloor::{
     evidence::Evidence,
     model::{Scores, TrainingRecord},
 };
+use noisefloor_cli::options::oracle::load_model;
 use noisefloor_cli::say::{NotSaid, say, say_json};
 use noisefloor_ptwne::scenes;
 use serde::Serialize;
-
-pub struct InspectJob {
-    pub model: Model,
-    pub json: bool,
-}
 
 /// What there is to say of a model, without its numbers.
 #[derive(Serialize)]
@@ -63,9 +60,10 @@ impl<'a> Summary<'a> {
     }
 }
 
-pub fn run(job: &InspectJob) -> anyhow::Result<()> {
-    let summary = Summary::of(&job.model);
-    if job.json {
+pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
+    let model = load_model(args.model.as_deref())?;
+    let summary = Summary::of(&model);
+    if args.json {
         say_json(&summary)?;
     } else {
         say_all(&summary)?;

@@ -2,92 +2,52 @@
 
 mod denoised;
 mod frames;
+mod job;
 mod read;
 mod report;
 
-pub use denoised::DenoisedJob;
+pub use job::{DenoisedJudge, Judge, JudgeJob, NoiseJudge};
 pub use read::warn_unread;
 
 use crate::output::open_for_colour;
 use anyhow::Context;
 use noisefloor::{
-    Audience, Oracle, Tile, TileGrid, ToneMapping, Verdict, Viewing,
+    Tile, TileGrid, Verdict,
     evidence::{Evidence, Samples},
     stills::{JudgedTiles, SnapshotPair, Still, StillError},
 };
 use noisefloor_cli::end::ANSWER_IS_NO;
 use noisefloor_cli::say::note;
 use noisefloor_cli::sources::start_threads;
-use noisefloor_farm::Frames;
 use noisefloor_image::maps::{Canvas, ColourScale, NOISE_SCALE, TileMark, draw_field, draw_tiles};
 use noisefloor_image::{Plane, ReadOptions, RenderLayers, SampleFacts, check_writable, write_exr};
 use read::{read, warn_of};
 use report::{Judged, Place, Row};
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
-#[derive(Clone)]
-pub struct JudgeJob {
-    /// With its samples per pixel; without them, the file says how many.
-    pub image: (PathBuf, Option<f64>),
-    /// At least one, in the same way.
-    pub against: Vec<(PathBuf, Option<f64>)>,
-    /// Of EXR files, if the user names one.
-    pub layer: Option<String>,
-    /// If the user says so.
-    pub samples: Option<Samples>,
-    /// Of a model that goes by halves; with a map of visible noise if one is to be drawn.
-    pub oracle: Oracle,
-    pub tone: ToneMapping,
-    pub viewing: Viewing,
-    pub audience: Audience,
-    pub tile: usize,
-    pub threads: Option<NonZeroUsize>,
-    pub json: bool,
-    pub heat_map: Option<PathBuf>,
-    pub noise_map: Option<PathBuf>,
-    pub exr: Option<PathBuf>,
-}
-
-pub enum Question {
-    Noise(Box<JudgeJob>),
-    Denoised(Box<DenoisedJob>),
-}
-
-/// Pictures, or those of all frames of a sequence, and whether the exit code tells.
-pub struct Judging {
-    pub question: Question,
-    pub frames: Option<Frames>,
-    pub check: bool,
-}
-
-pub fn run(judging: &Judging) -> anyhow::Result<ExitCode> {
-    let Judging { question, frames, check } = judging;
-    let (threads, json) = match question {
-        Question::Noise(job) => (job.threads, job.json),
-        Question::Denoised(job) => (job.threads, job.json),
-    };
-    start_threads(threads)?;
-    let is_converged = match frames {
-        Some(frames) => frames::run(question, frames, json)?,
-        None => question.judge(true)?.is_converged(),
-    };
-    Ok(if *check && !is_converged { ExitCode::from(ANSWER_IS_NO) } else { ExitCode::SUCCESS })
-}
-
-impl Question {
-    /// Judges, and draws what was asked for; `says` all of it.
-    fn judge(&self, says: bool) -> anyhow::Result<Judged> {
-        match self {
-            Self::Noise(job) => judge_noise(job, says),
-            Self::Denoised(job) => denoised::run(job, says),
+pub fn run(job: &JudgeJob) -> anyhow::Result<ExitCode> {
+    start_threads(job.threads)?;
+    let is_converged = match &job.frames {
+        Some(frames) => {
+            let value = if matches!(job.by, Judge::Noise(_)) { "P" } else { "JOD lost" };
+            frames::run(frames, value, job.json, |frame| judge(&job.of_frame(frame), false))?
         }
+        None => judge(job, true)?.is_converged(),
+    };
+    Ok(if job.check && !is_converged { ExitCode::from(ANSWER_IS_NO) } else { ExitCode::SUCCESS })
+}
+
+/// Judges, and draws what was asked for; `says` all of it.
+fn judge(job: &JudgeJob, says: bool) -> anyhow::Result<Judged> {
+    match &job.by {
+        Judge::Noise(by) => judge_noise(job, by, says),
+        Judge::Denoised(by) => denoised::run(job, by, says),
     }
 }
 
-fn judge_noise(job: &JudgeJob, says: bool) -> anyhow::Result<Judged> {
-    for path in [&job.heat_map, &job.noise_map, &job.exr].into_iter().flatten() {
+fn judge_noise(job: &JudgeJob, by: &NoiseJudge, says: bool) -> anyhow::Result<Judged> {
+    for path in [&by.heat_map, &job.noise_map, &by.exr].into_iter().flatten() {
         check_writable(path)?;
     }
     let options = ReadOptions { viewing: job.viewing, layer: job.layer.clone(), ..ReadOptions::default() };
@@ -113,16 +73,16 @@ fn judge_noise(job: &JudgeJob, says: bool) -> anyhow::Result<Judged> {
     let noticed = held.notice(grid)?;
     warn_of(&noticed.warnings);
     let unlike = noticed.unlike;
-    let judged = held.judge(&job.oracle, grid, job.audience).map_err(|error| match error {
+    let judged = held.judge(&by.oracle, grid, by.audience).map_err(|error| match error {
         StillError::Audience => anyhow::Error::new(error)
             .context("this model cannot judge for other eyes than those it has learned from; --eyes none"),
         error => error.into(),
     })?;
     let rows = rows(grid, image.spp, &judged, &unlike);
     if says {
-        report::say_all(&job.image.0, image.spp, &job.oracle, &rows, job.json)?;
+        report::say_all(&job.image.0, image.spp, &by.oracle, &rows, job.json)?;
     }
-    draw(job, &image, grid, &held, &judged, &rows)?;
+    draw(job, by, &image, grid, &held, &judged, &rows)?;
     let place = |row: &Row| {
         let Row { x, y, width, height, probability, .. } = *row;
         (row.converged, Place { x, y, width, height, probability: Some(probability), jods_lost: None })
@@ -161,6 +121,7 @@ fn rows(grid: TileGrid, spp: f64, judged: &JudgedTiles, unlike: &[bool]) -> Vec<
 
 fn draw(
     job: &JudgeJob,
+    by: &NoiseJudge,
     image: &Still,
     grid: TileGrid,
     held: &SnapshotPair<'_>,
@@ -168,15 +129,15 @@ fn draw(
     rows: &[Row],
 ) -> anyhow::Result<()> {
     let width = grid.width();
-    let wants_noise = job.noise_map.is_some() || job.exr.is_some();
-    let noise = wants_noise.then(|| judged.visible_noise(&job.oracle)).flatten();
+    let wants_noise = job.noise_map.is_some() || by.exr.is_some();
+    let noise = wants_noise.then(|| judged.visible_noise(&by.oracle)).flatten();
     if let (Some(path), Some(noise)) = (&job.noise_map, &noise) {
         draw_field(&Canvas::of_picture(width, &held.shown()), noise, &NOISE_SCALE).save(path)?;
     }
-    if let Some(path) = &job.exr {
+    if let Some(path) = &by.exr {
         write_channels(path, image, grid, rows, noise.as_deref())?;
     }
-    if let Some(path) = &job.heat_map {
+    if let Some(path) = &by.heat_map {
         let mark = |row: &Row| TileMark {
             tile: grid.tile(row.tile),
             value: f64::from(row.probability),

@@ -1,8 +1,10 @@
 //! `noisefloor metrics`.
 
+use crate::args::MetricsArgs;
 use crate::judge::warn_unread;
 use anyhow::{Context, anyhow, bail};
 use noisefloor::{Rgb, ToneMapping, Viewing, display::Display};
+use noisefloor_cli::refuse;
 use noisefloor_cli::say::{NotSaid, note, say};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{Picture, ReadOptions, check_writable, read_picture_with};
@@ -10,28 +12,15 @@ use noisefloor_rivals::DifferenceMap;
 use noisefloor_rivals::metrics::{MetricPair, MetricScores};
 use noisefloor_vision::Eotf;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What to type for the metrics that a build leaves out.
-pub const AGAIN: &str = "run `cargo run --release --features metrics -- metrics …`";
+const AGAIN: &str = "run `cargo run --release --features metrics -- metrics …`";
 
 /// Most pixels of a picture, those of 8K: a file of a few kilobytes may claim many more.
 const MOST_PIXELS: usize = 7680 * 4320;
 /// Memory that the metrics take, measured at 1.6 and at 65 megapixels.
 const BYTES_A_PIXEL: usize = if cfg!(feature = "metrics") { 300 } else { 120 };
-
-pub struct MetricsJob {
-    pub image: PathBuf,
-    pub reference: PathBuf,
-    /// Of EXR files, if the user names one.
-    pub layer: Option<String>,
-    pub viewing: Viewing,
-    pub tone: ToneMapping,
-    pub json: bool,
-    pub map: Option<PathBuf>,
-    pub flip_map: Option<PathBuf>,
-    pub butteraugli_map: Option<PathBuf>,
-}
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -71,11 +60,15 @@ const BUTTERAUGLI: ColourScale = ColourScale {
     landmark: None,
 };
 
-pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
+pub fn run(job: &MetricsArgs) -> anyhow::Result<()> {
+    if cfg!(not(feature = "metrics")) && (job.flip_map.is_some() || job.butteraugli_map.is_some()) {
+        refuse!("this build has no FLIP and butteraugli: {AGAIN}");
+    }
+    let (viewing, tone) = (job.viewing.or_default(), job.tone.check()?.load()?);
     for path in [&job.map, &job.flip_map, &job.butteraugli_map].into_iter().flatten() {
         check_writable(path)?;
     }
-    let options = ReadOptions { viewing: job.viewing, most_pixels: MOST_PIXELS, layer: job.layer.clone() };
+    let options = ReadOptions { viewing, most_pixels: MOST_PIXELS, layer: job.layer.layer.clone() };
     let read = |path| read_picture_with(path, &options);
     let (image, reference) = (read(&job.image)?, read(&job.reference)?);
     let names = || format!("{} and {}", job.image.display(), job.reference.display());
@@ -89,16 +82,16 @@ pub fn run(job: &MetricsJob) -> anyhow::Result<()> {
         bail!("{}: one is a PNG and one is not; compare pictures of one kind", names());
     }
     if !display_referred {
-        check_codes(job)?;
+        check_codes(&tone, viewing)?;
     }
     for path in [&job.image, &job.reference] {
         warn_unread(path, &options)?;
     }
     check_memory(size).with_context(names)?;
     let (image, reference) = (image.into_linear().pixels, reference.into_linear().pixels);
-    let display = if display_referred { Display::SRGB } else { job.tone.settle(&reference) };
+    let display = if display_referred { Display::SRGB } else { tone.settle(&reference) };
     let pair =
-        MetricPair { size, image: &image, reference: &reference, display: &display, viewing: &job.viewing };
+        MetricPair { size, image: &image, reference: &reference, display: &display, viewing: &viewing };
     let (scores, maps) = pair.measure().with_context(names)?;
 
     let shown: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
@@ -119,14 +112,13 @@ fn check_memory((width, height): (usize, usize)) -> anyhow::Result<()> {
 }
 
 /// What tone mapping makes must be what the display takes.
-fn check_codes(job: &MetricsJob) -> anyhow::Result<()> {
-    let makes_srgb = !matches!(job.tone, ToneMapping::Custom { .. });
-    let takes_srgb = matches!(job.viewing.params().eotf, Eotf::Srgb | Eotf::Gamma(_));
+fn check_codes(tone: &ToneMapping, viewing: Viewing) -> anyhow::Result<()> {
+    let makes_srgb = !matches!(tone, ToneMapping::Custom { .. });
+    let takes_srgb = matches!(viewing.params().eotf, Eotf::Srgb | Eotf::Gamma(_));
     if makes_srgb && !takes_srgb {
         bail!(
-            "--viewing {}: this display takes no sRGB values, which tone mapping makes; \
-             give a LUT that makes what it takes, or PNGs that hold it",
-            job.viewing
+            "--viewing {viewing}: this display takes no sRGB values, which tone mapping makes; \
+             give a LUT that makes what it takes, or PNGs that hold it"
         );
     }
     Ok(())
@@ -145,10 +137,14 @@ fn draw(
     Ok(())
 }
 
-fn say_scores(job: &MetricsJob, (width, height): (usize, usize), scores: MetricScores) -> anyhow::Result<()> {
+fn say_scores(
+    job: &MetricsArgs,
+    (width, height): (usize, usize),
+    scores: MetricScores,
+) -> anyhow::Result<()> {
     if job.json {
-        let MetricsJob { image, reference, viewing, .. } = job;
-        let report = Report { image, reference, width, height, viewing: *viewing, scores };
+        let MetricsArgs { image, reference, viewing, .. } = job;
+        let report = Report { image, reference, width, height, viewing: viewing.or_default(), scores };
         say!("{}", serde_json::to_string_pretty(&report)?)?;
         return Ok(());
     }

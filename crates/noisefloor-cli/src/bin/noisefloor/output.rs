@@ -3,32 +3,26 @@
 mod denoised;
 mod pictures;
 mod report;
-mod summary;
+pub mod summary;
 mod tiles;
 
 pub use denoised::{Denoised, ERROR_SCALE};
-pub use summary::say_noise;
+pub use report::{About, Over};
 pub use tiles::open_for_colour;
 
 use crate::job::{CriterionJob, RenderJob};
 use anyhow::{Context, bail};
-use noisefloor::{
-    Checkpoint, Rgb, Session,
-    criterion::{ExpectedThreshold, OpenFor},
-    driver::{Clock, Progress},
-    stills::SampleOrigin,
-};
+use denoised::DENOISED;
+use noisefloor::{Checkpoint, Rgb, Session, driver::Progress, stills::SampleOrigin};
 use noisefloor_cli::end::Usage;
 use noisefloor_cli::files::write_json;
 use noisefloor_cli::folder::{Earlier, Folder};
 use noisefloor_cli::say::{note, one_line};
-use noisefloor_cli::sources::Source;
 use noisefloor_image::{check_writable, write_atomic, write_csv};
 use noisefloor_rivals::metrics::relative_mse;
 use report::Report;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
@@ -46,11 +40,7 @@ struct TimelineRow {
 /// The output folder, and what has been recorded for it.
 pub struct Output {
     folder: Folder,
-    pub scene: String,
-    pub source: String,
-    job: RenderJob,
-    /// Digest of the model.
-    pub model: Option<String>,
+    pub about: About,
     /// To compare with: as many pixels as are rendered.
     pub reference: Option<Vec<Rgb>>,
     /// Where the samples come from, for whoever compares the picture with another.
@@ -58,17 +48,11 @@ pub struct Output {
     /// Who denoises the picture, if it is judged and written denoised.
     pub denoised: Option<Denoised>,
     timeline: Vec<TimelineRow>,
-    seconds_before: f64,
-    /// Until the first sample, of this run.
-    pub seconds_setup: Option<f64>,
     /// Whether there is an earlier render in the folder, and it is not resumed.
     overwrites: bool,
     /// Whether the checkpoint of a finished render is kept: frames of a sequence would fill the disk with them.
     keeps_finished: bool,
 }
-
-/// A run that is over: the time it took, and what counts samples, where that is here.
-pub type Over<'a> = (Clock, Option<&'a dyn Source>);
 
 /// Where an interrupted render continues, in its output folder.
 const CHECKPOINT: &str = "checkpoint.nfc";
@@ -76,7 +60,6 @@ const CHECKPOINT: &str = "checkpoint.nfc";
 const FINISHED: &str = "finished.nfc";
 pub const REPORT: &str = "report.json";
 const PICTURE: &str = "image.exr";
-const DENOISED: &str = "image-denoised.exr";
 const SHOWN: &str = "image.png";
 
 impl Output {
@@ -84,31 +67,21 @@ impl Output {
     pub fn create(
         folder: Folder,
         earlier: Earlier,
-        scene: String,
-        source: String,
-        job: RenderJob,
+        about: About,
         keeps_finished: bool,
     ) -> anyhow::Result<Self> {
         if let Some(occupied) = occupied(&folder, earlier, keeps_finished) {
             return Err(occupied.into());
         }
         check_writable(folder.path().join("image.exr"))?;
-        let (timeline, seconds_before) = (Vec::new(), 0.0);
-        let (model, reference, origin) = (None, None, None);
-        let overwrites = earlier == Earlier::Overwrite;
         Ok(Self {
             folder,
-            scene,
-            source,
-            job,
-            model,
-            reference,
-            origin,
+            about,
+            reference: None,
+            origin: None,
             denoised: None,
-            timeline,
-            seconds_before,
-            seconds_setup: None,
-            overwrites,
+            timeline: Vec::new(),
+            overwrites: earlier == Earlier::Overwrite,
             keeps_finished,
         })
     }
@@ -158,7 +131,7 @@ impl Output {
         let rows = csv::Reader::from_path(self.path("timeline.csv")).map(csv::Reader::into_deserialize);
         let rows = rows.into_iter().flatten().map_while(Result::ok);
         self.timeline = rows.take_while(|row: &TimelineRow| row.samples <= samples).collect();
-        self.seconds_before = self.timeline.last().map_or(0.0, |row| row.seconds);
+        self.about.seconds_before = self.timeline.last().map_or(0.0, |row| row.seconds);
     }
 
     pub fn record(&mut self, session: &Session, progress: &Progress) {
@@ -167,7 +140,7 @@ impl Output {
             .as_ref()
             .and_then(|reference| relative_mse(&session.film().image(), reference).ok());
         let noisefloor::driver::TimelinePoint { seconds, samples, active_tiles, .. } = progress.now;
-        let seconds = self.seconds_before + seconds;
+        let seconds = self.about.seconds_before + seconds;
         self.timeline.push(TimelineRow { seconds, samples, active_tiles, rel_mse });
     }
 
@@ -182,14 +155,14 @@ impl Output {
         if self.denoised.is_some() {
             // A denoiser that fails, or is killed, must not cost the samples
             self.write_tables(session, checkpoint.clone(), None)?;
-            let denoised = self.write_denoised(session);
-            let given_up = self.denoised.as_ref().is_some_and(Denoised::is_given_up);
-            match denoised {
-                Err(error) if given_up => {
+        }
+        if let Some(denoised) = &mut self.denoised {
+            match denoised.write(session, self.folder.path()) {
+                Err(error) if denoised.is_given_up() => {
                     note!("warning: the picture is not denoised: {}; --resume does it", one_line(&error));
                     return Ok(());
                 }
-                denoised => denoised.context("everything else is saved; --resume denoises the picture")?,
+                written => written.context("everything else is saved; --resume denoises the picture")?,
             }
         }
         self.write_tables(session, checkpoint, Some(over))
@@ -223,7 +196,11 @@ impl Output {
         if let Some(checkpoint) = checkpoint.filter(|_| under_way || self.keeps_finished) {
             write_atomic(self.path(if done { FINISHED } else { CHECKPOINT }), |to| checkpoint.write(to))?;
         }
-        write_json(&self.path(REPORT), &Report::new(self, session, &tiles, job.as_deref(), over))?;
+        let rel_mse = self.timeline.last().and_then(|row| row.rel_mse);
+        let denoised = self.denoised.as_ref().map(|denoised| denoised.report(session));
+        let mut report = Report::new(&self.about, session, &tiles, job.as_deref(), over);
+        (report.rel_mse, report.denoised) = (rel_mse, denoised);
+        write_json(&self.path(REPORT), &report)?;
         if under_way { Ok(()) } else { remove(&self.path(CHECKPOINT)) }
     }
 
@@ -322,30 +299,4 @@ fn remove(path: &Path) -> anyhow::Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// Where people are expected to stop seeing noise in the typical tile: that of median need. `None` if the
-/// criterion does not say.
-fn typical_threshold(session: &Session) -> Option<ExpectedThreshold> {
-    let tiles = 0..session.film().grid().len();
-    let mut thresholds: Vec<ExpectedThreshold> =
-        tiles.filter_map(|tile| session.verdict(tile)?.threshold).collect();
-    thresholds.sort_by_key(|threshold| threshold.median);
-    thresholds.get(thresholds.len() / 2).copied()
-}
-
-/// How many tiles are open, or reached a limit, for what.
-fn open_for(session: &Session) -> BTreeMap<OpenFor, usize> {
-    let mut counts = BTreeMap::new();
-    for why in (0..session.film().grid().len()).filter_map(|tile| session.open_for(tile)) {
-        *counts.entry(why).or_insert(0) += 1;
-    }
-    counts
-}
-
-/// Samples that uniform rendering at the largest stop would take, over all pixels.
-fn uniform_samples(session: &Session) -> u64 {
-    let grid = session.film().grid();
-    let most = (0..grid.len()).map(|t| session.film().spp(t)).max().unwrap_or(0);
-    most * (grid.width() * grid.height()) as u64
 }

@@ -1,14 +1,14 @@
 //! `noisefloor reference`.
 
-use crate::output::say_noise;
+use crate::args::ReferenceArgs;
+use crate::output::summary::say_noise;
 use crate::render::reference_bar;
 use anyhow::Context;
 use noisefloor::{Rgb, ToneMapping, source::Reference};
-use noisefloor_cli::end::Usage;
-use noisefloor_cli::folder::Earlier;
+use noisefloor_cli::refuse;
 use noisefloor_cli::say::{note, one_line, say};
 use noisefloor_cli::signals::{INTERRUPTED, cancel_on_signal};
-use noisefloor_cli::sources::{Opened, Resources, SourceJob};
+use noisefloor_cli::sources::Opened;
 use noisefloor_image::maps::Canvas;
 use noisefloor_image::{RenderLayers, check_writable, write_exr};
 use std::path::PathBuf;
@@ -17,18 +17,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-pub struct ReferenceJob {
-    pub source: SourceJob,
-    pub resources: Resources,
-    /// Ends in .exr.
-    pub out: Option<PathBuf>,
-    pub earlier: Earlier,
-    pub quiet: bool,
-}
-
-pub fn run(job: ReferenceJob) -> anyhow::Result<ExitCode> {
-    job.resources.start_threads()?;
-    let opened = job.source.open(job.resources)?;
+pub fn run(job: ReferenceArgs) -> anyhow::Result<ExitCode> {
+    if let Some(out) = &job.out
+        && out.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("exr"))
+    {
+        refuse!("{}: the reference is written as EXR, so its name must end in .exr", out.display());
+    }
+    let (source, resources) = job.renderer.check(Some(&job.scene))?;
+    resources.start_threads()?;
+    let opened = source.open(resources)?;
     opened.warn();
     let Opened { mut source, scene, .. } = opened;
     let out = match job.out {
@@ -38,9 +35,8 @@ pub fn run(job: ReferenceJob) -> anyhow::Result<ExitCode> {
             PathBuf::from(format!("out/{scene}-reference.exr"))
         }
     };
-    if job.earlier == Earlier::Keep && out.exists() {
-        let what = format!("{}: exists; --force overwrites it, --out names another file", out.display());
-        return Err(Usage(what).into());
+    if !job.force && out.exists() {
+        refuse!("{}: exists; --force overwrites it, --out names another file", out.display());
     }
     check_writable(&out)?;
 

@@ -13,7 +13,7 @@ mod watch;
 
 use crate::audit::{self, AuditJob};
 use crate::job::{CriterionJob, Ready, RenderJob, RenderRun};
-use crate::output::{Finished, Output, finished_frame};
+use crate::output::{About, Finished, Output, finished_frame};
 use anyhow::{Context, anyhow, bail};
 use noisefloor::{
     Checkpoint, Driver, DriverError, Event, ProgressiveSource, Repeats, Session, SessionError, SourceInfo,
@@ -132,8 +132,8 @@ impl Prepared {
         }
         let origin = job.source.origin(&scene, name, info.repeats == Repeats::Samples)?;
         let folder = Folder::claim(folder)?;
-        let mut output = Output::create(folder, earlier, scene, name.clone(), job.clone(), !is_frame)?;
-        output.model = oracle.map(|oracle| oracle.model().digest());
+        let about = About::new(scene, name.clone(), job, oracle.map(|oracle| oracle.model().digest()));
+        let mut output = Output::create(folder, earlier, about, !is_frame)?;
         (output.reference, output.origin, output.denoised) = (reference, origin, denoised);
         if resume {
             driver = take_up(driver, &mut output, *quiet)?;
@@ -145,7 +145,7 @@ impl Prepared {
         cancel_all_on_signal(flags.into_iter().flatten().collect(), AFTER_THIS_BATCH)?;
         driver.source_mut().watch_reference(reference_bar(*quiet), Arc::clone(&cancel));
         let views = Views::open(run, &output, (*width, *height))?;
-        output.seconds_setup = Some(began.elapsed().as_secs_f64());
+        output.about.seconds_setup = Some(began.elapsed().as_secs_f64());
         Ok(Some(Self { began, driver, output, views, cancel, keeps }))
     }
 
@@ -243,7 +243,11 @@ struct Views {
 impl Views {
     fn open(run: &RenderRun, output: &Output, size: (usize, usize)) -> anyhow::Result<Self> {
         Ok(Self {
-            tev: run.tev.as_deref().map(|address| Tev::open(address, &output.scene, size)).transpose()?,
+            tev: run
+                .tev
+                .as_deref()
+                .map(|address| Tev::open(address, &output.about.scene, size))
+                .transpose()?,
             #[cfg(feature = "watch")]
             page: run.watch.as_ref().map(|page| watch::Page::serve(page, output, run.quiet)).transpose()?,
         })

@@ -1,6 +1,5 @@
 //! `noisefloor-lab audience`.
 
-use crate::audience::FitJob;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
@@ -8,11 +7,11 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub struct AudienceArgs {
     #[command(subcommand)]
-    command: AudienceCommand,
+    pub command: AudienceCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum AudienceCommand {
+pub enum AudienceCommand {
     Fit(FitArgs),
 }
 
@@ -26,18 +25,11 @@ enum AudienceCommand {
 #[command(after_help = "Examples:
   noisefloor-lab audience fit students.csv
   noisefloor render --audience 1.94,-346")]
-struct FitArgs {
+pub struct FitArgs {
     /// Pairs of thresholds.
     #[arg(value_name = "FILE.csv")]
-    file: PathBuf,
+    pub file: PathBuf,
     /// Print JSON.
     #[arg(long)]
-    json: bool,
-}
-
-impl AudienceArgs {
-    pub fn check(self) -> FitJob {
-        let AudienceCommand::Fit(FitArgs { file, json }) = self.command;
-        FitJob { file, json }
-    }
+    pub json: bool,
 }

@@ -2,12 +2,11 @@
 
 use clap::Args;
 use noisefloor::{Audience, tile::DEFAULT_TILE};
-use noisefloor_cli::options::eyes::EyesArgs;
+use noisefloor_cli::options::eyes::{EyesArgs, Seen};
 use noisefloor_cli::options::layer::LayerArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
-use noisefloor_eyes::Person;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -63,18 +62,13 @@ pub struct ExploreArgs {
 
 impl ExploreArgs {
     pub fn check(self) -> anyhow::Result<crate::explore::ExploreJob> {
-        let oracle = self.oracle.check()?;
-        let said = [("--viewing", self.viewing.typed().is_some()), ("--audience", self.audience.is_some())];
-        let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;
-        let own = eyes.as_ref().map_or(Audience::TRAINED, Person::audience);
+        let Seen { oracle, viewing, audience } =
+            self.eyes.look(&self.oracle, &self.viewing, self.audience)?;
         let setup = noisefloor_study::explore::ExploreSetup {
             model: oracle.model().clone(),
             people: oracle.people(),
-            audience: self.audience.unwrap_or(own),
-            viewing: match &eyes {
-                Some(person) => person.viewing(),
-                None => self.viewing.judged_by(&oracle)?,
-            },
+            audience,
+            viewing,
             tile: self.tile,
             database: self.database,
             table: self.table.as_deref().map(crate::learning::read_table_file).transpose()?,

@@ -27,31 +27,20 @@ use std::path::PathBuf;
 pub struct ReproduceArgs {
     /// Corpus folders, as for `train`.
     #[arg(long, value_name = "DIR", num_args = 1.., required = true)]
-    corpus: Vec<PathBuf>,
+    pub corpus: Vec<PathBuf>,
     /// Output folder.
     #[arg(long, value_name = "DIR", default_value = "out/reproduce")]
-    out: PathBuf,
+    pub out: PathBuf,
     /// Edge of the tiles in pixels; each tile is the centre of its zone.
     #[arg(long, value_name = "PIXELS", default_value_t = DEFAULT_TILE, value_parser = values::edge)]
-    edge: usize,
+    pub edge: usize,
     /// Levels a zone, in equal steps up to its most converged image, 10…1000. The paper has 100.
     #[arg(long, value_name = "N", default_value_t = 75, value_parser = levels)]
-    levels: usize,
+    pub levels: usize,
     /// Instead of all this: learn N of the mask pairs as displayed, and write them (rows.npy) with the
     /// decision values of N others (machine.json), to compare with other programs.
     #[arg(long, value_name = "N", value_parser = count)]
-    dump_subset: Option<usize>,
-}
-
-impl ReproduceArgs {
-    pub fn check(self) -> crate::reproduce::ReproduceJob {
-        let (corpus, edge, levels) = (self.corpus, self.edge, self.levels);
-        crate::reproduce::ReproduceJob {
-            what: noisefloor_lab::reproduce::Reproduction { corpus, edge, levels },
-            out: self.out,
-            subset: self.dump_subset,
-        }
-    }
+    pub dump_subset: Option<usize>,
 }
 
 fn levels(text: &str) -> Result<usize, String> {

@@ -1,22 +1,10 @@
 //! `noisefloor-lab study`.
 
-use crate::study::{
-    AnalyseJob, BackupJob, DataFolderJob, LinksJob, ObserverJob, ServeJob, SimulateJob, StackDenoiser,
-    StackJob, StudyJob,
-};
-use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use noisefloor_cli::options::renderer::RendererArgs;
-use noisefloor_denoise::OIDN;
-use noisefloor_pages::http::Exposure;
-use noisefloor_sidecar::PictureCommand;
-use noisefloor_study::analysis::{AnalysisOptions, CorpusThreshold};
-use noisefloor_study::{Study, parse_code};
 use std::ffi::OsString;
-use std::net::{IpAddr, SocketAddr};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
+use std::net::IpAddr;
+use std::path::PathBuf;
 
 /// Ask people: collect thresholds in the browser, check what a model says, and train on the answers.
 ///
@@ -32,11 +20,11 @@ use std::time::Duration;
   noisefloor-lab train --corpus out/hall/corpus --corpus another-study --out my.nfm")]
 pub struct StudyArgs {
     #[command(subcommand)]
-    command: StudyCommand,
+    pub command: StudyCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum StudyCommand {
+pub enum StudyCommand {
     Stack(StackArgs),
     Serve(ServeArgs),
     Analyse(AnalyseArgs),
@@ -52,12 +40,12 @@ enum StudyCommand {
 
 /// Render a stack of pictures for a study in one go: each level goes on from the one before.
 #[derive(Debug, Args)]
-struct StackArgs {
+pub struct StackArgs {
     /// Scene, as for `render`.
     #[arg(value_name = "SCENE")]
-    scene: OsString,
+    pub scene: OsString,
     #[command(flatten)]
-    renderer: RendererArgs,
+    pub renderer: RendererArgs,
     /// Samples per pixel of the levels, increasing; the last one is the reference. By default each has 1.35 times the
     /// samples of the one before, with which intervals were tried; with coarser levels they are wrong more often.
     #[arg(
@@ -66,16 +54,16 @@ struct StackArgs {
         value_delimiter = ',',
         default_value = "8,11,15,20,27,36,48,65,88,119,161,217,293,396,534,721,974,1315,1775,2396"
     )]
-    levels: Vec<u64>,
+    pub levels: Vec<u64>,
     /// Denoise every level but the last, the reference: `oidn` is Open Image Denoise (`noisefloor doctor
     /// --install oidn`). Or name any program: {in} is the EXR that it reads, {out} the path, without
     /// extension, of the EXR or PFM that it writes. Thresholds of such pictures hold for this denoiser; a
     /// model cannot learn from them.
     #[arg(long, value_name = "oidn|PROGRAM …")]
-    denoise: Option<String>,
+    pub denoise: Option<String>,
     /// Folder to write the levels into, as linear EXRs.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub out: PathBuf,
 }
 
 /// Serve the pages of a study until Ctrl-C.
@@ -83,98 +71,98 @@ struct StackArgs {
 /// Only this machine can reach the server unless --listen says otherwise. Every answer is on disk before it
 /// is acknowledged, so the server may be killed and restarted at any time.
 #[derive(Debug, Args)]
-struct ServeArgs {
+pub struct ServeArgs {
     /// Study file.
     #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
+    pub study: PathBuf,
     /// Address to listen on. Answers travel unencrypted: use it only in a network that you trust.
     #[arg(long, value_name = "IP", default_value = "127.0.0.1")]
-    listen: IpAddr,
+    pub listen: IpAddr,
     /// Port; 0 picks a free one.
     #[arg(long, default_value_t = 8437)]
-    port: u16,
+    pub port: u16,
     /// Another name that browsers may use for this server. Repeat for more.
     #[arg(long, value_name = "HOST")]
-    allow_host: Vec<String>,
+    pub allow_host: Vec<String>,
     /// Trust X-Forwarded-For and X-Forwarded-Proto from a proxy at this address. Repeat for more.
     #[arg(long, value_name = "IP")]
-    trust_proxy: Vec<IpAddr>,
+    pub trust_proxy: Vec<IpAddr>,
     /// Path under which the proxy serves the study, such as /noise.
     #[arg(long, value_name = "PATH", default_value = "")]
-    base_path: String,
+    pub base_path: String,
     /// Admit simulated observers, for a rehearsal with a program of your own: they need no link, get no
     /// completion code, and their answers are kept apart.
     #[arg(long)]
-    admit_simulated: bool,
+    pub admit_simulated: bool,
 }
 
 /// Make one-time links, one for each participant.
 #[derive(Debug, Args)]
-struct LinksArgs {
+pub struct LinksArgs {
     /// Study file.
     #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
+    pub study: PathBuf,
     /// Number of links.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    count: u32,
+    pub count: u32,
     /// Address of the study as participants open it.
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:8437/")]
-    url: String,
+    pub url: String,
 }
 
 /// Write every response as data for others: one long table, and a BIDS-like folder with a data dictionary.
 #[derive(Debug, Args)]
-struct DataFolderArgs {
+pub struct DataFolderArgs {
     /// Study file.
     #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
+    pub study: PathBuf,
     /// Folder to write into.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub out: PathBuf,
     /// Write the responses of simulated observers instead of people.
     #[arg(long)]
-    simulated: bool,
+    pub simulated: bool,
 }
 
 /// Copy the database of a study, even while it is being served. To restore it, put the copy in its place.
 #[derive(Debug, Args)]
-struct BackupArgs {
+pub struct BackupArgs {
     /// Study file.
     #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
+    pub study: PathBuf,
     /// The copy, which must not exist yet.
     #[arg(value_name = "FILE")]
-    to: PathBuf,
+    pub to: PathBuf,
 }
 
 /// Analyse the answers: thresholds of tiles, agreement, the spread of people, groups, Table 2 of the paper, plots, and
 /// a corpus for `train`.
 #[derive(Debug, Args)]
-struct AnalyseArgs {
+pub struct AnalyseArgs {
     /// Study file.
     #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
+    pub study: PathBuf,
     /// Folder to write into.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub out: PathBuf,
     /// The threshold of a tile in the corpus and in the grid over the picture. `train` expects the mean: P
     /// counts the scatter of observers around it.
     #[arg(long, value_enum, default_value_t = ThresholdChoice::Mean)]
-    threshold: ThresholdChoice,
+    pub threshold: ThresholdChoice,
     /// Keep observers whom the rules of the study exclude.
     #[arg(long)]
-    keep_excluded: bool,
+    pub keep_excluded: bool,
     /// Analyse simulated observers instead of people.
     #[arg(long)]
-    simulated: bool,
+    pub simulated: bool,
     /// Seed of the bootstrap.
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    pub seed: u64,
 }
 
 /// What the threshold of a tile is.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum ThresholdChoice {
+pub enum ThresholdChoice {
     /// Where 95 % of observers see no difference.
     Level95,
     /// The mean over observers.
@@ -184,20 +172,20 @@ enum ThresholdChoice {
 /// Rehearse a study: simulated observers with made-up thresholds answer it through a real server. Their
 /// answers are kept apart from people's.
 #[derive(Debug, Args)]
-struct SimulateArgs {
+pub struct SimulateArgs {
     /// Study file.
     #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
+    pub study: PathBuf,
     /// Number of observers.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    observers: u16,
+    pub observers: u16,
     /// Standard deviation of ln(threshold) between people in one place; about half of its variance is common to all
     /// tiles.
     #[arg(long, value_name = "SD", default_value_t = 0.5, value_parser = deviation)]
-    spread: f64,
+    pub spread: f64,
     /// Seed: the same seed draws the same observers.
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    pub seed: u64,
 }
 
 fn deviation(text: &str) -> Result<f64, String> {
@@ -206,90 +194,11 @@ fn deviation(text: &str) -> Result<f64, String> {
 
 /// One observer.
 #[derive(Debug, Args)]
-struct ObserverArgs {
+pub struct ObserverArgs {
     /// Study file.
     #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
+    pub study: PathBuf,
     /// The participant's code.
     #[arg(value_name = "CODE")]
-    code: String,
-}
-
-impl StudyArgs {
-    /// A study that can be opened, and what to do with it.
-    pub fn check(self) -> anyhow::Result<StudyJob> {
-        Ok(match self.command {
-            StudyCommand::Stack(args) => StudyJob::Stack(stack(args)?),
-            StudyCommand::Serve(args) => StudyJob::Serve(ServeJob {
-                study: complete(&args.study)?,
-                address: SocketAddr::new(args.listen, args.port),
-                exposure: Exposure::named(&args.allow_host)
-                    .trusting(&args.trust_proxy)
-                    .under(&args.base_path),
-                admit_simulated: args.admit_simulated,
-            }),
-            StudyCommand::Analyse(args) => StudyJob::Analyse(AnalyseJob {
-                study: Arc::new(Study::open(&args.study)?),
-                out: args.out,
-                options: AnalysisOptions {
-                    keep_excluded: args.keep_excluded,
-                    seed: args.seed,
-                    simulated: args.simulated,
-                },
-                threshold: match args.threshold {
-                    ThresholdChoice::Level95 => CorpusThreshold::Level95,
-                    ThresholdChoice::Mean => CorpusThreshold::Mean,
-                },
-            }),
-            StudyCommand::Simulate(args) => StudyJob::Simulate(SimulateJob {
-                study: complete(&args.study)?,
-                observers: args.observers,
-                spread: args.spread,
-                seed: args.seed,
-            }),
-            StudyCommand::Links(args) => StudyJob::Links(LinksJob {
-                study: Study::open(&args.study)?,
-                count: args.count,
-                url: args.url,
-            }),
-            StudyCommand::Data(args) => StudyJob::Data(DataFolderJob {
-                study: Arc::new(Study::open(&args.study)?),
-                out: args.out,
-                simulated: args.simulated,
-            }),
-            StudyCommand::Backup(args) => {
-                StudyJob::Backup(BackupJob { study: Study::open(&args.study)?, to: args.to })
-            }
-            StudyCommand::Export(args) => StudyJob::Export(observer(&args)?),
-            StudyCommand::Erase(args) => StudyJob::Erase(observer(&args)?),
-        })
-    }
-}
-
-fn stack(args: StackArgs) -> anyhow::Result<StackJob> {
-    let StackArgs { scene, renderer, levels, denoise, out } = args;
-    // Levels between those rendered are synthesised: their noise has to fall as 1/√n
-    let (source, resources) = renderer.independent_by_default().check(Some(&scene))?;
-    let denoise = denoise.map(|word| stack_denoiser(&word, resources.timeout)).transpose()?;
-    Ok(StackJob { source, resources, levels, denoise, out })
-}
-
-fn stack_denoiser(word: &str, timeout: Duration) -> anyhow::Result<StackDenoiser> {
-    if word == OIDN.name {
-        return Ok(StackDenoiser::Oidn { timeout });
-    }
-    Ok(StackDenoiser::Program(PictureCommand::new(word, timeout)?))
-}
-
-/// A study all of whose pictures can be shown.
-fn complete(path: &Path) -> anyhow::Result<Arc<Study>> {
-    let study = Study::open(path)?;
-    study.check_pictures()?;
-    Ok(Arc::new(study))
-}
-
-fn observer(args: &ObserverArgs) -> anyhow::Result<ObserverJob> {
-    let code = parse_code(&args.code)
-        .with_context(|| format!("{:?} cannot be a code: a code has twelve letters and digits", args.code))?;
-    Ok(ObserverJob { study: Study::open(&args.study)?, code })
+    pub code: String,
 }

@@ -1,6 +1,6 @@
 //! `render --config`: options from a file, as if they were typed before the others.
 
-use super::Cli;
+use super::render::RenderArgs;
 use anyhow::Context;
 use clap::error::ErrorKind;
 use noisefloor_cli::files::read_small;
@@ -17,10 +17,15 @@ pub fn expand(typed: Vec<OsString>) -> anyhow::Result<Vec<OsString>> {
     if typed.get(1).is_none_or(|command| command != "render") {
         return Ok(typed);
     }
-    let Some(path) = config(&typed[2..]) else { return Ok(typed) };
     let (before, after) = typed.split_at(2);
+    Ok([before, &with_file(after)?].concat())
+}
+
+/// Options of `render`, with those of the file before them.
+pub(super) fn with_file(typed: &[OsString]) -> anyhow::Result<Vec<OsString>> {
+    let Some(path) = config(typed) else { return Ok(typed.to_vec()) };
     let options = options(&path).with_context(|| format!("--config {}", path.display()))?;
-    Ok([before, &options, after].concat())
+    Ok([&options, typed].concat())
 }
 
 /// The last file named by `--config`.
@@ -84,14 +89,12 @@ fn option(name: &str, value: Option<&str>) -> OsString {
 
 /// What is wrong with one option by itself.
 fn problem(name: &str, value: Option<&str>) -> Option<String> {
-    let render = Cli::known().find_subcommand("render")?.clone();
-    let known =
-        || render.get_arguments().filter(|known| !known.is_hide_set()).filter_map(|known| known.get_long());
-    if !known().any(|known| known == name) {
+    let render = RenderArgs::alone();
+    let mut known = render.get_arguments().filter(|known| !known.is_hide_set());
+    if !known.any(|known| known.get_long() == Some(name)) {
         return Some(format!("`render` has no option {name}; `noisefloor render --help` lists them"));
     }
-    let typed = [OsString::from("noisefloor"), "render".into(), option(name, value)];
-    let error = Cli::parsed(typed).err()?;
+    let error = RenderArgs::parsed([option(name, value)]).err()?;
     let value = value.unwrap_or("true");
     match error.kind() {
         ErrorKind::InvalidValue | ErrorKind::ValueValidation => {

@@ -1,6 +1,5 @@
 //! `noisefloor doctor`.
 
-use crate::doctor::DoctorJob;
 use clap::{Args, ValueHint};
 use noisefloor_cli::sources::Adapter;
 use noisefloor_denoise::OIDN;
@@ -19,10 +18,10 @@ use noisefloor_sidecar::Renderer;
 pub struct DoctorArgs {
     /// Install this renderer or denoiser, if it is not there yet.
     #[arg(long, value_name = "NAME", value_parser = installable, value_hint = ValueHint::Other)]
-    install: Option<&'static Renderer>,
+    pub install: Option<&'static Renderer>,
     /// Print JSON instead of a table.
     #[arg(long, conflicts_with = "install")]
-    json: bool,
+    pub json: bool,
 }
 
 fn installable(text: &str) -> Result<&'static Renderer, String> {
@@ -34,10 +33,4 @@ fn installable(text: &str) -> Result<&'static Renderer, String> {
     adapter
         .map(|adapter| adapter.renderer)
         .map_err(|error| format!("{error}; the denoiser is {}", denoiser.name))
-}
-
-impl DoctorArgs {
-    pub fn check(self) -> DoctorJob {
-        DoctorJob { install: self.install, json: self.json }
-    }
 }

@@ -1,14 +1,15 @@
 //! `noisefloor farm`.
 
-use super::{Cli, Command, expand};
-use crate::farm::{self, FarmRender, FarmTask, MergeTask, PlanTask, RunTask};
-use crate::job::RenderRun;
+use super::config::with_file;
+use super::render::RenderArgs;
+use crate::job::{RenderJob, RenderRun};
 use crate::render::SequenceExposure;
-use anyhow::bail;
+use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::values;
 use noisefloor_cli::refuse;
+use noisefloor_cli::sources::Resources;
 use noisefloor_farm::{Frames, Slurm};
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -33,11 +34,11 @@ use std::time::Duration;
   noisefloor farm merge shots/hall/frame/merged/*.nfs --out hall              shards without their farm")]
 pub struct FarmArgs {
     #[command(subcommand)]
-    command: FarmCommand,
+    pub command: FarmCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum FarmCommand {
+pub enum FarmCommand {
     /// Say what is to be rendered, or plan the next round of what is there.
     ///
     /// What follows `--` is as for `noisefloor render`, without --out and the like. Every scene is opened
@@ -69,150 +70,129 @@ enum FarmCommand {
 }
 
 #[derive(Debug, Args)]
-struct MergeArgs {
+pub struct MergeArgs {
     /// Folder of the farm; with --out, shards: files that tasks have written.
     #[arg(required = true, value_name = "DIR|SHARD")]
-    paths: Vec<PathBuf>,
+    pub paths: Vec<PathBuf>,
     /// Merge files of shards into this output folder.
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Overwrite the render that is in the output folder.
     #[arg(long, requires = "out")]
-    force: bool,
+    pub force: bool,
 }
 
 #[derive(Debug, Args)]
-struct PlanArgs {
+pub struct PlanArgs {
     /// Folder of the farm, on a file system that all machines share.
-    dir: PathBuf,
+    pub dir: PathBuf,
     /// Frames, as for `noisefloor render`: 1-240, 1-100x5, 1,5,9 or -3--1. {frame} in the name of the scene, or
     /// {frame:04} for four digits, is the number of the frame (####, %04d and $F4, too). Each frame has a seed of its own. All have the exposure of the first, for which they
     /// wait; after `--`, --exposure-from or --exposure give another.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    frames: Option<Frames>,
+    pub frames: Option<Frames>,
     /// Most tasks of a round over all frames, up to 1000; short rounds have fewer.
     #[arg(long, default_value = "16", value_name = "N", value_parser = tasks)]
-    tasks: usize,
+    pub tasks: usize,
     /// Keep shards once they are merged, in FRAME/merged: for `farm merge --out`.
     #[arg(long)]
-    keep_shards: bool,
+    pub keep_shards: bool,
     /// Scene and options, as for `noisefloor render`.
     #[arg(last = true, value_name = "RENDER OPTIONS")]
-    render: Vec<OsString>,
+    pub render: Vec<OsString>,
 }
 
 #[derive(Debug, Args)]
-struct RunArgs {
+pub struct RunArgs {
     /// Folder of the farm.
-    dir: PathBuf,
+    pub dir: PathBuf,
     /// Run the tasks here, N at a time, and return when everything is done.
     #[arg(long, value_name = "N")]
-    local: Option<NonZeroUsize>,
+    pub local: Option<NonZeroUsize>,
     /// An option for `sbatch`, such as --sbatch=--partition=render. Can be given more than once.
     #[arg(long, value_name = "OPTION", conflicts_with = "local", allow_hyphen_values = true)]
-    sbatch: Vec<String>,
+    pub sbatch: Vec<String>,
     /// Return when everything is done, not when the first round is submitted. Submits again if the jobs have
     /// vanished.
     #[arg(long, conflicts_with = "local")]
-    wait: bool,
+    pub wait: bool,
     /// With --wait: seconds between two looks.
     #[arg(long, default_value = "10", value_name = "SECONDS", value_parser = values::seconds)]
-    every: Duration,
+    pub every: Duration,
     /// Say nothing but errors.
     #[arg(short, long)]
-    quiet: bool,
+    pub quiet: bool,
 }
 
 #[derive(Debug, Args)]
-struct StatusArgs {
+pub struct StatusArgs {
     /// Folder of the farm.
-    dir: PathBuf,
+    pub dir: PathBuf,
     /// As JSON.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]
-struct TaskArgs {
-    dir: PathBuf,
-    round: usize,
-    task: usize,
+pub struct TaskArgs {
+    pub dir: PathBuf,
+    pub round: usize,
+    pub task: usize,
 }
 
 #[derive(Debug, Args)]
-struct StepArgs {
-    dir: PathBuf,
-    round: usize,
+pub struct StepArgs {
+    pub dir: PathBuf,
+    pub round: usize,
     #[arg(long, allow_hyphen_values = true)]
-    sbatch: Vec<String>,
+    pub sbatch: Vec<String>,
 }
 
 fn tasks(text: &str) -> Result<usize, String> {
     values::within(text, 1..=Slurm::most_tasks())
 }
 
-impl FarmArgs {
-    pub fn check(self) -> anyhow::Result<FarmTask> {
-        Ok(match self.command {
-            FarmCommand::Plan(PlanArgs { dir, frames, tasks, keep_shards: keep, render }) => {
-                let render = if render.is_empty() { None } else { Some(renders(render, frames.as_ref())?) };
-                FarmTask::Plan(Box::new(PlanTask { dir, frames, tasks, keep, render }))
-            }
-            FarmCommand::Run(RunArgs { dir, local, sbatch, wait, every, quiet }) => {
-                let local = local.map(NonZeroUsize::get);
-                FarmTask::Run(RunTask { dir, local, sbatch, wait, every, quiet })
-            }
-            FarmCommand::Merge(MergeArgs { paths, out: Some(out), force }) => {
-                FarmTask::Merge(MergeTask::Shards { shards: paths, out, force })
-            }
-            FarmCommand::Merge(MergeArgs { paths, .. }) => match <[PathBuf; 1]>::try_from(paths) {
-                Ok([dir]) => FarmTask::Merge(MergeTask::Farm(dir)),
-                Err(_) => refuse!("one folder of a farm, or shards and --out for their picture"),
-            },
-            FarmCommand::Status(StatusArgs { dir, json }) => FarmTask::Status { dir, json },
-            FarmCommand::Task(TaskArgs { dir, round, task }) => FarmTask::Task { dir, round, task },
-            FarmCommand::Step(StepArgs { dir, round, sbatch }) => FarmTask::Step { dir, round, sbatch },
-        })
-    }
-}
-
-/// The render that follows `--`. Other machines know neither the current folder nor the file of --config.
-fn renders(typed: Vec<OsString>, frames: Option<&Frames>) -> anyhow::Result<(FarmRender, SequenceExposure)> {
-    let words = ["noisefloor".into(), "render".into()].into_iter().chain(typed);
-    let cli = Cli::parsed(expand(words.collect())?);
-    let cli = cli.map_err(|error| anyhow::anyhow!("after `--`: {error}"))?;
-    let Command::Render(args) = cli.command else { bail!("after `--`, options of `noisefloor render`") };
-    if args.is_sequence() {
-        refuse!("--frames: before `--`, as in `farm plan DIR --frames 1-240 -- 'hall.{{frame:04}}.xml'`");
-    }
-    let (run, exposure) = match frames {
-        Some(frames) => args.check_of(frames)?,
-        None => (args.check()?, SequenceExposure::Each),
-    };
-    let absent = |frame: &&i32| frames.is_some_and(|frames| !frames.contains(**frame));
-    if let Some(frame) = exposure.frames().iter().find(absent) {
-        refuse!(
-            "--exposure-from: frame {frame} is not among the frames of the farm; render it first, \
-             and give its output folder"
-        );
-    }
-    let RenderRun { job, resources, out, time, against, earlier, tev, watch, audit, .. } = run;
-    for (option, given) in [
-        ("--tev", tev.is_some()),
-        ("--watch", watch.is_some()),
-        ("--out", out.is_some()),
-        ("--time", time.is_some()),
-        ("--against", against.is_some()),
-        ("--audit", audit.is_some()),
-        ("--resume and --force", earlier != Earlier::Keep),
-    ] {
-        if given {
+impl PlanArgs {
+    /// The render that follows `--`, and where its frames have their exposure from; none to plan the next round of what
+    /// is there. Other machines know neither the current folder nor the file of --config.
+    pub fn render(&self) -> anyhow::Result<Option<(RenderJob, Resources, SequenceExposure)>> {
+        if self.render.is_empty() {
+            return Ok(None);
+        }
+        let frames = self.frames.as_ref();
+        let args =
+            RenderArgs::parsed(with_file(&self.render)?).map_err(|error| anyhow!("after `--`: {error}"))?;
+        if args.is_sequence() {
+            refuse!("--frames: before `--`, as in `farm plan DIR --frames 1-240 -- 'hall.{{frame:04}}.xml'`");
+        }
+        let (run, exposure) = match frames {
+            Some(frames) => args.check_of(frames)?,
+            None => (args.check()?, SequenceExposure::Each),
+        };
+        let absent = |frame: &&i32| frames.is_some_and(|frames| !frames.contains(**frame));
+        if let Some(frame) = exposure.frames().iter().find(absent) {
             refuse!(
-                "{option}: not for a farm, which renders into its own folder, to the end, on other machines; \
-                 leave it out"
+                "--exposure-from: frame {frame} is not among the frames of the farm; render it first, \
+             and give its output folder"
             );
         }
+        let RenderRun { job, resources, out, time, against, earlier, tev, watch, audit, .. } = run;
+        for (option, given) in [
+            ("--tev", tev.is_some()),
+            ("--watch", watch.is_some()),
+            ("--out", out.is_some()),
+            ("--time", time.is_some()),
+            ("--against", against.is_some()),
+            ("--audit", audit.is_some()),
+            ("--resume and --force", earlier != Earlier::Keep),
+        ] {
+            if given {
+                refuse!(
+                    "{option}: not for a farm, which renders into its own folder, to the end, on other machines; \
+                 leave it out"
+                );
+            }
+        }
+        Ok(Some((job.absolute()?, resources, exposure)))
     }
-    farm::check(&job)?;
-    Ok((FarmRender::new(job.absolute()?, resources)?, exposure))
 }

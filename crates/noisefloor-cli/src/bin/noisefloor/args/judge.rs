@@ -1,13 +1,13 @@
 //! `noisefloor judge`.
 
-use crate::judge::{DenoisedJob, JudgeJob, Judging, Question};
+use crate::judge::{DenoisedJudge, Judge, JudgeJob, NoiseJudge};
 use clap::Args;
 use noisefloor::{
-    Audience,
+    Viewing,
     evidence::{Evidence, Samples},
     tile::DEFAULT_TILE,
 };
-use noisefloor_cli::options::eyes::EyesArgs;
+use noisefloor_cli::options::eyes::{EyesArgs, Seen};
 use noisefloor_cli::options::layer::LayerArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::tone::ToneArgs;
@@ -110,7 +110,7 @@ pub struct JudgeArgs {
 }
 
 impl JudgeArgs {
-    pub fn check(mut self) -> anyhow::Result<Judging> {
+    pub fn check(mut self) -> anyhow::Result<JudgeJob> {
         // In the order in which --spp counts them
         self.against.splice(..0, std::mem::take(&mut self.others));
         if self.against.is_empty() {
@@ -120,8 +120,7 @@ impl JudgeArgs {
                 self.image.display()
             );
         }
-        let (frames, check) = (self.frames.take(), self.check);
-        if frames.is_some() {
+        if self.frames.is_some() {
             let maps = [&self.heat_map, &self.noise_map, &self.exr].into_iter().flatten();
             let mut names =
                 std::iter::once(&self.image).chain(&self.against).chain(&self.denoised).chain(maps);
@@ -132,68 +131,21 @@ impl JudgeArgs {
                 );
             }
         }
-        let question = match <[PathBuf; 2]>::try_from(self.denoised.clone()) {
-            Ok(denoised) => Question::Denoised(Box::new(self.check_denoised(denoised)?)),
-            Err(_) => Question::Noise(Box::new(self.check_noise()?)),
-        };
-        Ok(Judging { question, frames, check })
-    }
-
-    fn check_denoised(self, denoised: [PathBuf; 2]) -> anyhow::Result<DenoisedJob> {
-        self.eyes.unused("--denoised")?;
-        let tone = self.tone.check()?.load()?;
-        let Ok([against]) = <[PathBuf; 1]>::try_from(self.against) else {
-            refuse!("--denoised compares two halves: give one picture with --against");
-        };
-        let spp = match self.spp.as_slice() {
-            [] => [None; 2],
-            [a, b] => [Some(*a), Some(*b)],
-            other => refuse!("--spp is needed once for each picture: {} given for 2 pictures", other.len()),
-        };
-        Ok(DenoisedJob {
-            layer: self.layer.layer,
-            noisy: [(self.image, spp[0]), (against, spp[1])],
-            denoised,
-            samples: self.independent.then_some(Samples::Independent),
-            lost: self.lost,
-            tone,
-            viewing: self.viewing.or_default(),
-            tile: self.tile,
-            threads: self.threads,
-            json: self.json,
-            noise_map: self.noise_map,
-        })
-    }
-
-    fn check_noise(self) -> anyhow::Result<JudgeJob> {
-        let tone = self.tone.check()?.load()?;
-        let oracle = self.oracle.check()?;
-        let said = [("--viewing", self.viewing.typed().is_some())];
-        let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;
-        let oracle = match &eyes {
-            Some(person) => oracle.with_scatter(person.uncertainty()),
-            None => oracle,
-        };
-        let viewing = match &eyes {
-            Some(person) => person.viewing(),
-            None => self.viewing.judged_by(&oracle)?,
-        };
-        if oracle.model().evidence() != Evidence::Halves {
-            refuse!(
-                "this model does not compare tiles with other samples, as `judge` does: use one that was trained on half buffers"
-            );
-        }
         let pictures = 1 + self.against.len();
+        let (by, viewing) = match <[PathBuf; 2]>::try_from(std::mem::take(&mut self.denoised)) {
+            Ok(made) => {
+                self.eyes.unused("--denoised")?;
+                if pictures != 2 {
+                    refuse!("--denoised compares two halves: give one picture with --against");
+                }
+                (Judge::Denoised(DenoisedJudge { made, lost: self.lost }), self.viewing.or_default())
+            }
+            Err(_) => self.noise()?,
+        };
         if !self.spp.is_empty() && self.spp.len() != pictures {
             refuse!(
                 "--spp is needed once for each picture: {} given for {pictures} pictures",
                 self.spp.len()
-            );
-        }
-        if self.noise_map.is_some() && !oracle.maps_visible_noise() {
-            refuse!(
-                "--noise-map: a model with the {} descriptor has no map of visible noise; the bundled model has one",
-                oracle.model().descriptor().name()
             );
         }
         let samples = match (self.nested, self.independent) {
@@ -202,23 +154,38 @@ impl JudgeArgs {
             _ => None,
         };
         let mut counts = self.spp.into_iter().map(Some).chain(std::iter::repeat(None));
-        let image = (self.image, counts.next().flatten());
-        let against = self.against.into_iter().zip(counts).collect();
         Ok(JudgeJob {
+            image: (self.image, counts.next().flatten()),
+            against: self.against.into_iter().zip(counts).collect(),
+            by,
             layer: self.layer.layer,
-            image,
-            against,
             samples,
-            oracle,
-            tone,
+            tone: self.tone.check()?.load()?,
             viewing,
-            audience: eyes.map_or(Audience::TRAINED, |person| person.audience()),
             tile: self.tile,
             threads: self.threads,
             json: self.json,
-            heat_map: self.heat_map,
             noise_map: self.noise_map,
-            exr: self.exr,
+            frames: self.frames,
+            check: self.check,
         })
+    }
+
+    /// Who judges the noise of pictures, and where they are seen.
+    fn noise(&mut self) -> anyhow::Result<(Judge, Viewing)> {
+        let Seen { oracle, viewing, audience } = self.eyes.look(&self.oracle, &self.viewing, None)?;
+        if oracle.model().evidence() != Evidence::Halves {
+            refuse!(
+                "this model does not compare tiles with other samples, as `judge` does: use one that was trained on half buffers"
+            );
+        }
+        if self.noise_map.is_some() && !oracle.maps_visible_noise() {
+            refuse!(
+                "--noise-map: a model with the {} descriptor has no map of visible noise; the bundled model has one",
+                oracle.model().descriptor().name()
+            );
+        }
+        let (heat_map, exr) = (self.heat_map.take(), self.exr.take());
+        Ok((Judge::Noise(Box::new(NoiseJudge { oracle, audience, heat_map, exr })), viewing))
     }
 }

@@ -1,11 +1,9 @@
 //! `noisefloor metrics`.
 
-use crate::metrics::MetricsJob;
 use clap::Args;
 use noisefloor_cli::options::layer::LayerArgs;
 use noisefloor_cli::options::tone::ToneArgs;
 use noisefloor_cli::options::viewing::ViewingArgs;
-use noisefloor_cli::refuse;
 use std::path::PathBuf;
 
 /// Say how visibly a picture differs from its reference, by published metrics.
@@ -35,45 +33,26 @@ Values (--json has the same keys):
 pub struct MetricsArgs {
     /// Picture to compare: EXR, PFM or PNG.
     #[arg(value_name = "IMAGE")]
-    image: PathBuf,
+    pub image: PathBuf,
     /// What it should look like, of the same size and kind.
     #[arg(value_name = "REFERENCE")]
-    reference: PathBuf,
+    pub reference: PathBuf,
     #[command(flatten)]
-    layer: LayerArgs,
+    pub layer: LayerArgs,
     #[command(flatten)]
-    viewing: ViewingArgs,
+    pub viewing: ViewingArgs,
     #[command(flatten)]
-    tone: ToneArgs,
+    pub tone: ToneArgs,
     /// Print JSON instead of a table.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     /// Write where ColorVideoVDP sees differences, in JODs lost, over the picture.
     #[arg(long, value_name = "FILE.png")]
-    map: Option<PathBuf>,
+    pub map: Option<PathBuf>,
     /// Write the map of FLIP. (Needs a build with the feature `metrics`, and so does the next one.)
     #[arg(long, value_name = "FILE.png")]
-    flip_map: Option<PathBuf>,
+    pub flip_map: Option<PathBuf>,
     /// Write the map of butteraugli.
     #[arg(long, value_name = "FILE.png")]
-    butteraugli_map: Option<PathBuf>,
-}
-
-impl MetricsArgs {
-    pub fn check(self) -> anyhow::Result<MetricsJob> {
-        if cfg!(not(feature = "metrics")) && (self.flip_map.is_some() || self.butteraugli_map.is_some()) {
-            refuse!("this build has no FLIP and butteraugli: {}", crate::metrics::AGAIN);
-        }
-        Ok(MetricsJob {
-            image: self.image,
-            reference: self.reference,
-            layer: self.layer.layer,
-            viewing: self.viewing.or_default(),
-            tone: self.tone.check()?.load()?,
-            json: self.json,
-            map: self.map,
-            flip_map: self.flip_map,
-            butteraugli_map: self.butteraugli_map,
-        })
-    }
+    pub butteraugli_map: Option<PathBuf>,
 }

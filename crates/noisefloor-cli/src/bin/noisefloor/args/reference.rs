@@ -1,10 +1,7 @@
 //! `noisefloor reference`.
 
-use crate::reference::ReferenceJob;
 use clap::Args;
-use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::renderer::RendererArgs;
-use noisefloor_cli::refuse;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -24,30 +21,17 @@ use std::path::PathBuf;
 pub struct ReferenceArgs {
     /// Scene, as for `render`.
     #[arg(value_name = "SCENE")]
-    scene: OsString,
+    pub scene: OsString,
     #[command(flatten)]
-    renderer: RendererArgs,
+    pub renderer: RendererArgs,
     /// The picture in linear light; a PNG of what it looks like is written beside it [default:
     /// out/SCENE-reference.exr].
     #[arg(long, value_name = "FILE.exr")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Overwrite the picture if there is one of that name.
     #[arg(long)]
-    force: bool,
+    pub force: bool,
     /// No progress bar and no summary.
     #[arg(long, short)]
-    quiet: bool,
-}
-
-impl ReferenceArgs {
-    pub fn check(self) -> anyhow::Result<ReferenceJob> {
-        if let Some(out) = &self.out
-            && out.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("exr"))
-        {
-            refuse!("{}: the reference is written as EXR, so its name must end in .exr", out.display());
-        }
-        let (source, resources) = self.renderer.check(Some(&self.scene))?;
-        let earlier = Earlier::of(self.force, false);
-        Ok(ReferenceJob { source, resources, out: self.out, earlier, quiet: self.quiet })
-    }
+    pub quiet: bool,
 }

@@ -4,7 +4,7 @@ use super::audit::places;
 use super::verdicts::{CriterionChoice, Preset, VerdictArgs};
 use crate::job::{Autosave, CriterionJob, RenderJob, RenderRun, WatchPage};
 use crate::render::{SequenceExposure, SequenceRun, TEV_ADDRESS, exposure_of};
-use clap::{Args, Command};
+use clap::{Args, Command, FromArgMatches};
 use noisefloor::{Audience, Viewing};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::denoiser::DenoiserChoice;
@@ -272,6 +272,16 @@ fn no_spp(text: &str) -> Result<String, String> {
 }
 
 impl RenderArgs {
+    /// The command by itself.
+    pub fn alone() -> Command {
+        Self::augment_args(Command::new("noisefloor render").no_binary_name(true))
+    }
+
+    /// What follows `noisefloor render`.
+    pub fn parsed(typed: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
+        Self::from_arg_matches(&Self::alone().try_get_matches_from(typed)?)
+    }
+
     /// A render that can begin.
     pub fn check(self) -> anyhow::Result<RenderRun> {
         if matches!(self.exposure_from, Some(ExposureFrom::First | ExposureFrom::Frames(_))) {

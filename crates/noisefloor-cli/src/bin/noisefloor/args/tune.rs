@@ -7,7 +7,7 @@ use noisefloor::Audience;
 use noisefloor::tune::{Knob, Search};
 use noisefloor_cli::folder::Earlier;
 use noisefloor_cli::options::denoiser::DenoiserChoice;
-use noisefloor_cli::options::eyes::EyesArgs;
+use noisefloor_cli::options::eyes::{EyesArgs, Seen};
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::renderer::RendererArgs;
 use noisefloor_cli::options::tone::ToneArgs;
@@ -198,20 +198,10 @@ impl TuneArgs {
                 Audience::TRAINED,
             )
         } else {
-            let said = [("--viewing", self.viewing.typed().is_some())];
-            let eyes = self.eyes.of(self.oracle.model.as_deref(), &said)?;
-            let oracle = self.oracle.check()?;
+            let Seen { oracle, viewing, audience } = self.eyes.look(&self.oracle, &self.viewing, None)?;
             if !oracle.maps_visible_noise() {
                 refuse!("this model does not say how strong noise is; the bundled model does");
             }
-            let viewing = match &eyes {
-                Some(person) => person.viewing(),
-                None => self.viewing.judged_by(&oracle)?,
-            };
-            let (oracle, audience) = match eyes {
-                Some(person) => (oracle.with_scatter(person.uncertainty()), person.audience()),
-                None => (oracle, Audience::TRAINED),
-            };
             (TuneCriterion::Noise(Box::new(oracle)), viewing, audience)
         };
         if viewing.frames_per_second().is_some() && self.fps.is_some() {

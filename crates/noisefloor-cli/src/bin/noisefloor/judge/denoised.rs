@@ -1,10 +1,11 @@
 //! Denoised pictures made elsewhere.
 
+use super::job::{DenoisedJudge, JudgeJob};
 use super::read::{read, warn_of};
 use super::report::{Judged, Place};
 use anyhow::{Context, bail};
 use noisefloor::{
-    Rgb, Tile, TileGrid, ToneMapping, Viewing,
+    Rgb, Tile, TileGrid, Viewing,
     criterion::OpenFor,
     evidence::{Evidence, Samples},
     stills::{SnapshotPair, Still},
@@ -15,28 +16,7 @@ use noisefloor_image::maps::{Canvas, draw_field};
 use noisefloor_image::{ReadOptions, check_writable};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::Serialize;
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-
-/// Two halves, and what a denoiser has made of each.
-#[derive(Clone)]
-pub struct DenoisedJob {
-    /// With their samples per pixel; without them, the files say how many.
-    pub noisy: [(PathBuf, Option<f64>); 2],
-    pub denoised: [PathBuf; 2],
-    /// Of the noisy EXR files, if the user names one.
-    pub layer: Option<String>,
-    /// If the user says so.
-    pub samples: Option<Samples>,
-    /// JODs that a tile may lose.
-    pub lost: f64,
-    pub tone: ToneMapping,
-    pub viewing: Viewing,
-    pub tile: usize,
-    pub threads: Option<NonZeroUsize>,
-    pub json: bool,
-    pub noise_map: Option<PathBuf>,
-}
 
 #[derive(Serialize)]
 struct Row {
@@ -52,24 +32,25 @@ struct Row {
 
 #[derive(Serialize)]
 struct Report<'a> {
-    images: [&'a Path; 2],
-    denoised: [&'a Path; 2],
+    images: Vec<&'a Path>,
+    denoised: &'a [PathBuf; 2],
     limit: f64,
     converged_tiles: usize,
     tiles: &'a [Row],
 }
 
-pub(super) fn run(job: &DenoisedJob, says: bool) -> anyhow::Result<Judged> {
+pub(super) fn run(job: &JudgeJob, by: &DenoisedJudge, says: bool) -> anyhow::Result<Judged> {
     job.noise_map.iter().try_for_each(check_writable)?;
     let options = ReadOptions { viewing: job.viewing, layer: job.layer.clone(), ..ReadOptions::default() };
-    let [a, b] = [read(&job.noisy[0], &options)?, read(&job.noisy[1], &options)?];
+    let [against] = job.against.as_slice() else { bail!("--denoised compares two halves") };
+    let [a, b] = [read(&job.image, &options)?, read(against, &options)?];
     let denoised = |path, of| denoised(path, of, &job.viewing);
-    let [da, db] = [denoised(&job.denoised[0], &a)?, denoised(&job.denoised[1], &b)?];
+    let [da, db] = [denoised(&by.made[0], &a)?, denoised(&by.made[1], &b)?];
     if da == db {
         bail!(
             "{} and {} are identical: each has to be made from its own half, by a denoiser that looks at it",
-            job.denoised[0].display(),
-            job.denoised[1].display()
+            by.made[0].display(),
+            by.made[1].display()
         );
     }
     let pair = SnapshotPair::new(Evidence::Halves, &a, &[&b], job.tone.clone(), job.samples)?;
@@ -94,9 +75,9 @@ pub(super) fn run(job: &DenoisedJob, says: bool) -> anyhow::Result<Judged> {
     let error = DenoisedError::new(&halves, pair.display())?;
     let film = pair.film(TileGrid::new(size.0, size.1, job.tile)?);
     let unmet = film.map_or_else(Vec::new, |film| jods_lost_unmet(&film, pair.display(), &job.viewing));
-    let rows = judge(job, &error, &unmet)?;
+    let rows = judge(job, by.lost, &error, &unmet)?;
     if says {
-        say_all(job, &rows)?;
+        say_all(job, by, &rows)?;
     }
     if let Some(path) = &job.noise_map {
         let shown: Vec<Rgb> = error.shown().iter().map(|&shown| [shown; 3]).collect();
@@ -121,7 +102,8 @@ fn denoised(path: &Path, of: &Still, viewing: &Viewing) -> anyhow::Result<Vec<Rg
 
 /// `unmet` has what each tile would lose by light that it is likely to lack, if the pictures tell.
 fn judge(
-    job: &DenoisedJob,
+    job: &JudgeJob,
+    limit: f64,
     error: &DenoisedError,
     unmet: &[(Tile, f64, OpenFor)],
 ) -> anyhow::Result<Vec<Row>> {
@@ -130,21 +112,21 @@ fn judge(
     let mut row = |tile: Tile| {
         let jods_lost = error.jods_lost(tile, &eyes, &mut room)?;
         let Tile { index, x, y, width, height } = tile;
-        let enough = jods_lost * ESTIMATE_ERRS_BY <= job.lost;
-        let lacking = unmet.get(index).filter(|(_, lost, _)| *lost > job.lost).map(|(.., kind)| *kind);
+        let enough = jods_lost * ESTIMATE_ERRS_BY <= limit;
+        let lacking = unmet.get(index).filter(|(_, lost, _)| *lost > limit).map(|(.., kind)| *kind);
         let open_for = if enough { lacking } else { Some(OpenFor::Noise) };
         Ok(Row { tile: index, x, y, width, height, jods_lost, converged: open_for.is_none(), open_for })
     };
     grid.tiles().map(&mut row).collect()
 }
 
-fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
+fn say_all(job: &JudgeJob, by: &DenoisedJudge, rows: &[Row]) -> anyhow::Result<()> {
     let converged_tiles = rows.iter().filter(|row| row.converged).count();
     if job.json {
         return say_json(&Report {
-            images: job.noisy.each_ref().map(|(path, _)| path.as_path()),
-            denoised: job.denoised.each_ref().map(PathBuf::as_path),
-            limit: job.lost,
+            images: std::iter::once(&job.image).chain(&job.against).map(|(path, _)| path.as_path()).collect(),
+            denoised: &by.made,
+            limit: by.lost,
             converged_tiles,
             tiles: rows,
         });
@@ -161,8 +143,8 @@ fn say_all(job: &DenoisedJob, rows: &[Row]) -> anyhow::Result<()> {
     say!(
         "{converged_tiles} of {} denoised tiles have lost at most {} JOD: 19 of 20 with an estimate of up to {:.3}",
         rows.len(),
-        job.lost,
-        job.lost / ESTIMATE_ERRS_BY
+        by.lost,
+        by.lost / ESTIMATE_ERRS_BY
     )?;
     let missing = rows.iter().filter(|row| !matches!(row.open_for, None | Some(OpenFor::Noise))).count();
     if missing > 0 {

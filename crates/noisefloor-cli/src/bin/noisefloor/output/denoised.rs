@@ -1,13 +1,13 @@
 //! image-denoised.exr, image-denoised.png, denoised-error.png, albedo.exr and normal.exr, and what is said
 //! of them.
 
-use super::{DENOISED, Output};
 use noisefloor::{Rgb, Session, StoppingCriterion, source::FirstHits};
 use noisefloor_cli::say::{NotSaid, say};
 use noisefloor_denoise::{Denoiser, Guides, NoisyPicture, compose, spp_without_denoising, stops_err_by};
 use noisefloor_image::maps::{Canvas, ColourScale, draw_field};
 use noisefloor_image::{RenderLayers, write_exr};
 use serde::Serialize;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -15,6 +15,9 @@ use std::time::Instant;
 /// Samples of a picture from which light that is seldom met is hardly ever missed: the chance to have met nothing of light that
 /// one in 250,000 finds is then 2·10⁻⁴.
 const MANY: u64 = 1 << 21;
+
+/// The picture that people look at, where it is denoised.
+pub const DENOISED: &str = "image-denoised.exr";
 
 pub struct Denoised {
     denoiser: Box<dyn Denoiser>,
@@ -93,41 +96,38 @@ pub const ERROR_SCALE: ColourScale = ColourScale {
     landmark: None,
 };
 
-impl Output {
-    /// Denoises the picture, and writes it with the map of its error.
-    pub(super) fn write_denoised(&mut self, session: &Session) -> anyhow::Result<()> {
-        let Some(denoised) = &mut self.denoised else { return Ok(()) };
+impl Denoised {
+    /// Denoises the picture, and writes it with the map of its error into a folder.
+    pub(super) fn write(&mut self, session: &Session, folder: &Path) -> anyhow::Result<()> {
         let (width, height) = session.film().grid().size();
         let began = Instant::now();
-        let (noisy, wants) = (session.film().image(), denoised.denoiser.wants());
+        let (noisy, wants) = (session.film().image(), self.denoiser.wants());
         let picture = NoisyPicture::new((width, height), &noisy);
-        let picture = match &denoised.guide {
+        let picture = match &self.guide {
             Some((guide, clean)) => picture.guided(guide, *clean, wants),
             None => picture,
         };
-        let mut image = denoised.denoiser.denoise(&picture)?;
+        let mut image = self.denoiser.denoise(&picture)?;
         compose(session, &noisy, &mut image);
         let display = session.display_so_far();
         let encoded: Vec<Rgb> = image.iter().map(|&p| display.encode(p)).collect();
         let viewing = session.params().viewing;
-        denoised.spp_without =
-            spp_without_denoising(session.film(), &display, &image, viewing, denoised.lost);
-        denoised.picture_seconds = began.elapsed().as_secs_f64();
-        write_exr(self.path(DENOISED), &RenderLayers::rgb(width, height, &image))?;
-        if let Some((guide, _)) = self.denoised.as_ref().and_then(|denoised| denoised.guide.as_ref()) {
-            write_exr(self.path("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
-            write_exr(self.path("normal.exr"), &RenderLayers::rgb(width, height, &guide.normal))?;
+        self.spp_without = spp_without_denoising(session.film(), &display, &image, viewing, self.lost);
+        self.picture_seconds = began.elapsed().as_secs_f64();
+        write_exr(folder.join(DENOISED), &RenderLayers::rgb(width, height, &image))?;
+        if let Some((guide, _)) = &self.guide {
+            write_exr(folder.join("albedo.exr"), &RenderLayers::rgb(width, height, &guide.albedo))?;
+            write_exr(folder.join("normal.exr"), &RenderLayers::rgb(width, height, &guide.normal))?;
         }
         let shown = Canvas::of_picture(width, &encoded);
-        shown.save(self.path("image-denoised.png"))?;
+        shown.save(folder.join("image-denoised.png"))?;
         if let Some(map) = session.criterion().map_of_jods_lost() {
-            draw_field(&shown, map, &ERROR_SCALE).save(self.path("denoised-error.png"))?;
+            draw_field(&shown, map, &ERROR_SCALE).save(folder.join("denoised-error.png"))?;
         }
         Ok(())
     }
 
-    pub(super) fn say_denoised(&self, session: &Session) -> Result<(), NotSaid> {
-        let Some(denoised) = &self.denoised else { return Ok(()) };
+    pub(super) fn say(&self, session: &Session) -> Result<(), NotSaid> {
         let DenoisedReport {
             denoiser,
             guided,
@@ -136,7 +136,7 @@ impl Output {
             jods_lost,
             undenoised_tiles,
             spp_without,
-        } = denoised.report(session);
+        } = self.report(session);
         let grid = session.film().grid();
         let spp = session.film().total_samples() as f64 / (grid.width() * grid.height()) as f64;
         let without = spp_without.map_or_else(

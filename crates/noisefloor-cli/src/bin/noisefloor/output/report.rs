@@ -2,14 +2,35 @@
 
 use super::denoised::DenoisedReport;
 use super::tiles::TileState;
-use super::{Output, Over, open_for, typical_threshold, uniform_samples};
 use crate::job::RenderJob;
 use noisefloor::{
     Params, Session,
     criterion::{ExpectedThreshold, OpenFor},
+    driver::Clock,
 };
+use noisefloor_cli::sources::Source;
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+/// What is rendered, by what, and how long that took before the samples of this run.
+pub struct About {
+    pub scene: String,
+    pub source: String,
+    pub job: RenderJob,
+    /// Digest of the model.
+    pub model: Option<String>,
+    pub seconds_setup: Option<f64>,
+    pub seconds_before: f64,
+}
+
+impl About {
+    pub fn new(scene: String, source: String, job: &RenderJob, model: Option<String>) -> Self {
+        Self { scene, source, job: job.clone(), model, seconds_setup: None, seconds_before: 0.0 }
+    }
+}
+
+/// A run that is over: the time it took, and what counts samples, where that is here.
+pub type Over<'a> = (Clock, Option<&'a dyn Source>);
 
 #[derive(Serialize)]
 pub(super) struct Report<'a> {
@@ -73,15 +94,15 @@ pub(super) struct Report<'a> {
     seconds_source: Option<f64>,
     seconds_oracle: Option<f64>,
     seconds_total: Option<f64>,
-    rel_mse: Option<f64>,
+    pub(super) rel_mse: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    denoised: Option<DenoisedReport>,
+    pub(super) denoised: Option<DenoisedReport>,
 }
 
 impl<'a> Report<'a> {
     /// What is known now; with the time it took and what became of the samples when the run is over.
     pub(super) fn new(
-        output: &'a Output,
+        about: &'a About,
         session: &'a Session,
         tiles: &[TileState],
         job: Option<&'a str>,
@@ -98,15 +119,15 @@ impl<'a> Report<'a> {
         }
         Self {
             noisefloor: env!("CARGO_PKG_VERSION"),
-            scene: &output.scene,
-            source: &output.source,
+            scene: &about.scene,
+            source: &about.source,
             width: grid.width(),
             height: grid.height(),
-            seed: output.job.source.seed,
+            seed: about.job.source.seed,
             criterion: session.criterion().name(),
-            model: output.model.as_deref(),
+            model: about.model.as_deref(),
             job,
-            render: &output.job,
+            render: &about.job,
             params: session.params(),
             exposure: session.display().map(noisefloor::display::Display::exposure),
             judged_for_fps: session.params().viewing.frames_per_second(),
@@ -128,13 +149,39 @@ impl<'a> Report<'a> {
             reference_samples: noise.map(|n| n.samples),
             reference_deviation: noise.map(|n| n.deviation()),
             reference_worst: noise.map(|n| n.worst()),
-            seconds_before: output.seconds_before,
-            seconds_setup: output.seconds_setup,
+            seconds_before: about.seconds_before,
+            seconds_setup: about.seconds_setup,
             seconds_source: clock.map(|c| c.source_seconds),
             seconds_oracle: clock.map(|c| c.criterion_seconds),
             seconds_total: clock.map(|c| c.total_seconds),
-            rel_mse: output.timeline.last().and_then(|row| row.rel_mse),
-            denoised: output.denoised.as_ref().map(|denoised| denoised.report(session)),
+            rel_mse: None,
+            denoised: None,
         }
     }
+}
+
+/// Where people are expected to stop seeing noise in the typical tile: that of median need. `None` if the
+/// criterion does not say.
+pub(super) fn typical_threshold(session: &Session) -> Option<ExpectedThreshold> {
+    let tiles = 0..session.film().grid().len();
+    let mut thresholds: Vec<ExpectedThreshold> =
+        tiles.filter_map(|tile| session.verdict(tile)?.threshold).collect();
+    thresholds.sort_by_key(|threshold| threshold.median);
+    thresholds.get(thresholds.len() / 2).copied()
+}
+
+/// How many tiles are open, or reached a limit, for what.
+pub(super) fn open_for(session: &Session) -> BTreeMap<OpenFor, usize> {
+    let mut counts = BTreeMap::new();
+    for why in (0..session.film().grid().len()).filter_map(|tile| session.open_for(tile)) {
+        *counts.entry(why).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// Samples that uniform rendering at the largest stop would take, over all pixels.
+pub(super) fn uniform_samples(session: &Session) -> u64 {
+    let grid = session.film().grid();
+    let most = (0..grid.len()).map(|t| session.film().spp(t)).max().unwrap_or(0);
+    most * (grid.width() * grid.height()) as u64
 }

@@ -1,6 +1,7 @@
 //! A render in a few lines, for people.
 
-use super::{CHECKPOINT, Output, open_for, typical_threshold, uniform_samples};
+use super::report::{open_for, typical_threshold, uniform_samples};
+use super::{CHECKPOINT, Output};
 use crate::job::CriterionJob;
 use noisefloor::{
     Audience, Rgb, Session, Tile,
@@ -19,7 +20,7 @@ impl Output {
     /// Says what came of the render.
     pub fn summarise(&self, session: &Session, clock: Clock, source: &dyn Source) -> Result<(), NotSaid> {
         self.say_stops(session)?;
-        self.say_denoised(session)?;
+        self.denoised.as_ref().map_or(Ok(()), |denoised| denoised.say(session))?;
         say!(
             "{:.1} s, of which {:.2} s ({:.2} %) in the oracle",
             clock.total_seconds,
@@ -76,7 +77,7 @@ impl Output {
             )?;
         }
         if let Some(threshold) = typical_threshold(session) {
-            let stop = match self.job.criterion {
+            let stop = match self.about.job.criterion {
                 CriterionJob::Oracle { people, .. } => {
                     format!("; tiles stop where {people} of them see none")
                 }

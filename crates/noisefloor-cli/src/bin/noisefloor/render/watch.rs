@@ -37,7 +37,7 @@ impl Page {
                 ),
             }
         }
-        let state = LiveState::new(&output.scene, &output.source);
+        let state = LiveState::new(&output.about.scene, &output.about.source);
         Ok(Self { live, state, blank: true, pace: Pace::of_view(PAUSE) })
     }
 
