@@ -48,6 +48,7 @@ pub(super) struct Repeats {
 
 impl Repeats {
     /// Whether what was read can be of a tile that got so many batches.
+    #[cfg(feature = "files")]
     pub(super) fn fits(&self, tile: Tile, batches: u64) -> bool {
         let points = if batches == 0 { 0 } else { points::compared(tile).count() };
         self.first.len() == points && self.known.len() as u64 == batches.min(2 * REMEMBERED as u64)
