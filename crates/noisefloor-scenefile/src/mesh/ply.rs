@@ -351,8 +351,8 @@ impl Header {
                     return Ok(Self { elements, format, length: at });
                 }
                 _ => {
-                    let what = format_args!("`{}` is no line of the header of a PLY file", cut(&line));
-                    return Err(here.bad(what));
+                    let line = cut(&line);
+                    return Err(here.bad(format_args!("`{line}` is no line of the header of a PLY file")));
                 }
             }
             Place::file(path).at_most("properties", properties, MAX_PROPERTIES)?;
