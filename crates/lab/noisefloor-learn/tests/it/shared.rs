@@ -47,4 +47,8 @@ fn staircase_is_read() {
         count += 1;
     }
     assert!(count > 16 * 17, "{count}");
+    // Played back, a zone ends here: nothing comes after it, and elsewhere a request would be an error
+    let mut stack = StackSource::open(dir.join("zone00")).unwrap();
+    let tile = TileGrid::new(128, 128, 128).unwrap().tile(0);
+    assert_eq!(stack.sample(&[Request::new(tile, 5600, 1)]).unwrap()[0].spp, 0);
 }
