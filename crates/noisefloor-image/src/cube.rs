@@ -12,7 +12,7 @@ const MAX_BYTES: u64 = 96 << 20;
 /// Reads a `.cube` file: a 1D LUT, a 3D LUT, or a 1D LUT before a 3D one, as Resolve writes them.
 ///
 /// # Errors
-/// [`PictureError`] if the file cannot be read, is too long, or [broken](noisefloor::display::CubeError).
+/// [`PictureError`] if the file cannot be read, is too long, or [broken](crate::CubeError).
 pub fn read_cube(path: impl AsRef<Path>) -> Result<ColourLut, PictureError> {
     let path = path.as_ref();
     let Opened { reader, bytes, .. } = Opened::open(path)?;

@@ -7,8 +7,7 @@
 //! - [`read_unread`]: what is ignored of a file: alpha and further layers.
 //! - [`write_exr`], [`write_png`], [`write_atomic`], [`check_writable`]: files that appear complete or not at
 //!   all.
-//! - [`read_cube`]: a `.cube` LUT, and as a tone mapping (`ColourLut::into_tone_curve` of
-//!   `noisefloor::display`).
+//! - [`read_cube`]: a `.cube` LUT, and as a tone mapping ([`ColourLut::into_tone_curve`]).
 //! - `maps`, behind the feature of that name: numbers drawn over a picture, in colours, with a legend.
 //! - [`StackSource`]: a folder of images as a [`noisefloor::ProgressiveSource`].
 //! - [`running_means`], [`batches`]: which samples are in which file of a stack.
@@ -65,6 +64,8 @@ pub use decode_png::read_png;
 pub use error::{PictureError, PictureFault, StackError, WriteError, WriteFault};
 pub use facts::{SampleFacts, read_facts};
 pub use frames::{Frame, batches, running_means};
+#[doc(inline)]
+pub use noisefloor::display::{ColourLut, CubeError, LutInput, LutInputError};
 pub use open::{MAX_FILE_BYTES, ReadOptions};
 pub use picture::{DisplayImage, LinearImage, Picture};
 pub use plane::Plane;

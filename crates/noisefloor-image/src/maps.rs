@@ -106,7 +106,7 @@ impl DrawTarget for Canvas {
 }
 
 impl Canvas {
-    /// A canvas of one colour, at most [`noisefloor::tile::MAX_EDGE`] pixels and a legend wide.
+    /// A canvas of one colour, at most 65,536 pixels and a legend wide.
     pub fn new(width: usize, height: usize, colour: [u8; 3]) -> Self {
         Self { width, height, pixels: vec![colour; width * height] }
     }

@@ -8,8 +8,7 @@ use std::io::{BufReader, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Longest file that is read, in bytes: enough for an EXR of [`noisefloor::tile::MAX_PIXELS`] pixels in 32-bit
-/// floats.
+/// Longest file that is read, in bytes: enough for an EXR of 2²⁸ pixels in 32-bit floats.
 pub const MAX_FILE_BYTES: u64 = 1 << 32;
 
 /// How a picture is read.

@@ -12,14 +12,20 @@ mod lut;
 mod srgb;
 mod tone_curve;
 mod tone_table;
-pub use crate::rgb::luminance;
-pub use cube::{CubeError, parse_cube};
-pub use lut::{ColourLut, LutInput, LutInputError};
-pub use srgb::{srgb_decode, srgb_encode};
 pub use tone_curve::ToneCurve;
 pub use tone_table::ToneTableError;
 
+// For the crates of this repository; LUTs are on the pages of noisefloor-image, which reads their files
+#[doc(hidden)]
+pub use {
+    crate::rgb::luminance,
+    cube::{CubeError, parse_cube},
+    lut::{ColourLut, LutInput, LutInputError},
+    srgb::{srgb_decode, srgb_encode},
+};
+
 /// Key of an average scene (Reinhard et al. 2002, §3.1): what the log-average luminance is mapped to.
+#[doc(hidden)]
 pub const DEFAULT_KEY: f32 = 0.18;
 
 /// Least and most that an exposure can be.

@@ -72,6 +72,7 @@ pub mod source;
 pub mod stills;
 #[doc(hidden)]
 pub mod svm;
+#[doc(hidden)]
 pub mod text;
 pub mod tile;
 pub mod tune;

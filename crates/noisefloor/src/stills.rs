@@ -21,7 +21,8 @@ use thiserror::Error;
 
 mod notice;
 mod origin;
-pub use origin::{OriginRelation, SampleOrigin};
+use origin::OriginRelation;
+pub use origin::SampleOrigin;
 
 /// Pixels that a thread looks at.
 const AT_ONCE: usize = 1 << 16;

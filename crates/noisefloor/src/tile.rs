@@ -6,20 +6,26 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Smallest tile edge, in pixels: below it a descriptor has too few pixels to pool over.
+#[doc(hidden)]
 pub const MIN_TILE: usize = 16;
 /// Largest tile edge, in pixels.
+#[doc(hidden)]
 pub const MAX_TILE: usize = 512;
 /// Default tile edge, in pixels (Takouachet et al. 2017, §4.2.2).
+#[doc(hidden)]
 pub const DEFAULT_TILE: usize = 128;
 /// Largest image edge that is accepted, in pixels: a limit before anything is allocated.
+#[doc(hidden)]
 pub const MAX_EDGE: usize = 65_536;
 /// Largest number of pixels that is accepted.
+#[doc(hidden)]
 pub const MAX_PIXELS: usize = 1 << 28;
 
 /// Checks an image's size against the limits, before anything of that size is allocated.
 ///
 /// # Errors
 /// [`TileError::Image`] if it is empty or too large.
+#[doc(hidden)]
 pub fn check_image(width: usize, height: usize) -> Result<(), TileError> {
     let fits = (1..=MAX_EDGE).contains(&width) && (1..=MAX_EDGE).contains(&height);
     if fits && width * height <= MAX_PIXELS { Ok(()) } else { Err(TileError::Image(width, height)) }
@@ -102,10 +108,10 @@ impl<'a> TilePixels<'a> {
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TileError {
-    /// The tile edge is outside [`MIN_TILE`]…[`MAX_TILE`].
+    /// The tile edge is outside 16…512 pixels.
     #[error("tile size {0} is outside {MIN_TILE}…{MAX_TILE} pixels; the default is {DEFAULT_TILE}")]
     Edge(usize),
-    /// The image is empty or larger than [`MAX_EDGE`] or [`MAX_PIXELS`] allow.
+    /// The image is empty or larger than 65,536 pixels along an edge, or 2²⁸ in all.
     #[error(
         "an image of {0}×{1} pixels cannot be judged: each edge must be 1…{MAX_EDGE} and the area at most {MAX_PIXELS}"
     )]
@@ -152,7 +158,7 @@ impl TileGrid {
     /// Divides an image of `width`×`height` pixels into tiles of `edge` pixels.
     ///
     /// # Errors
-    /// [`TileError`] if `edge` is outside [`MIN_TILE`]…[`MAX_TILE`] or the image is empty or too large.
+    /// [`TileError`] if `edge` is outside 16…512 pixels or the image is empty or too large.
     pub fn new(width: usize, height: usize, edge: usize) -> Result<Self, TileError> {
         check_image(width, height)?;
         if !(MIN_TILE..=MAX_TILE).contains(&edge) {

@@ -71,8 +71,10 @@ mod shift;
 mod values;
 
 pub use borders::MixUp;
+pub use light::ImpossibleLight;
+#[doc(hidden)]
+pub use light::LightCheck;
 pub(crate) use light::check_picture;
-pub use light::{ImpossibleLight, LightCheck};
 pub use said::{Encoding, Fault, Precision, Warning};
 pub(crate) use values::PictureValues;
 

@@ -3,9 +3,8 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 
 use noisefloor::{
-    Audience, Oracle, TileGrid, ToneMapping,
+    Audience, Oracle, Params, TileGrid, ToneMapping,
     stills::{Samples, SnapshotPair, Still},
-    tile::DEFAULT_TILE,
 };
 use noisefloor_image::{LinearImage, read_exr};
 use std::error::Error;
@@ -34,7 +33,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let oracle = Oracle::bundled();
     let (tone, how) = (ToneMapping::default(), Some(Samples::Independent));
     let pair = SnapshotPair::new(oracle.model().evidence(), &image, &[&other], tone, how)?;
-    let grid = TileGrid::new(image.size.0, image.size.1, DEFAULT_TILE)?;
+    let grid = TileGrid::new(image.size.0, image.size.1, Params::default().tile)?;
     for warning in pair.notice(grid)?.warnings {
         eprintln!("warning: {warning}");
     }

@@ -42,14 +42,15 @@ fn curves() -> MutexGuard<'static, BTreeMap<Key, Weak<Map>>> {
 /// and hold it meanwhile: a digest without a curve is an error, so that no curve is without its function.
 ///
 /// ```
-/// use noisefloor::{Params, ToneMapping, display::ToneCurve};
+/// use noisefloor::display::{Display, ToneCurve};
+/// use noisefloor::{Params, ToneMapping};
 ///
 /// // Hable's filmic curve, with a white point of 11.2; encoded for an sRGB screen
 /// fn hable(x: f32) -> f32 {
 ///     ((x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.5) + 0.06)) - 0.02 / 0.3
 /// }
 /// let filmic = ToneCurve::new(b"Hable, white 11.2", |exposed| {
-///     exposed.map(|x| noisefloor::display::srgb_encode(hable(2.0 * x) / hable(11.2)))
+///     Display::SRGB.encode(exposed.map(|x| hable(2.0 * x) / hable(11.2)))
 /// });
 /// let params = Params::default().with_tone_mapping(ToneMapping::Custom { exposure: 1.0, curve: filmic });
 /// assert!(params.check().is_ok());

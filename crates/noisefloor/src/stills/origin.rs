@@ -19,8 +19,7 @@ pub struct SampleOrigin {
 
 /// What the origins of two pictures say about their samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum OriginRelation {
+pub(super) enum OriginRelation {
     /// Nothing: they are of different scenes or renderers.
     Unknown,
     /// How the samples of one lie in those of the other.
@@ -39,7 +38,7 @@ impl SampleOrigin {
 
     /// Whether two pictures share samples. Different seeds of one scene and renderer give independent ones,
     /// whatever the other options are.
-    pub fn relation(&self, other: &Self) -> OriginRelation {
+    pub(super) fn relation(&self, other: &Self) -> OriginRelation {
         if self.source != other.source {
             OriginRelation::Unknown
         } else if self.seed != other.seed {
