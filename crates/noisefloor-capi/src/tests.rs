@@ -740,8 +740,9 @@ fn what_is_known_of_one_picture_is_told() {
                 }
                 ok(nf_search_tell(search, told));
                 assert_eq!(nf_search_tell(search, told), NfStatus::Argument, "once");
-                let told = Excess::new(ratio).of_pictures(pictures).with_floor(floor);
-                rust.tell(told.with_alone((alone > 0.0).then_some(alone)), &[]);
+                let mut told = Excess::new(ratio);
+                (told.pictures, told.alone, told.floor) = (pictures, (alone > 0.0).then_some(alone), floor);
+                rust.tell(told, &[]);
             }
             assert_eq!(nf_search_tell(search, NfExcess::default()), NfStatus::Argument);
             assert_eq!((nf_search_free(search), nf_search_free(search)), (NfStatus::Ok, NfStatus::Handle));

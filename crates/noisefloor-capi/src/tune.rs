@@ -157,8 +157,9 @@ pub extern "C" fn nf_search_tell(search: *const NfSearch, excess: NfExcess) -> N
             let what = "nf_search_tell answers nf_search_next, once; after the end there is nothing to tell";
             return Err(Failure::new(NfStatus::Argument, what.to_owned()));
         }
-        let told = Excess::new(ratio).at(place).of_pictures(pictures).with_alone(alone);
-        asked.search.tell(told.with_floor(floor), &[]);
+        let mut told = Excess::new(ratio);
+        (told.place, told.pictures, told.alone, told.floor) = (place, pictures, alone, floor);
+        asked.search.tell(told, &[]);
         Ok(())
     })
 }

@@ -226,11 +226,12 @@ impl PySearch {
     #[pyo3(signature = (excess, *, alone = None))]
     fn tell(&self, excess: ExcessLike<'_>, alone: Option<f64>) -> PyResult<()> {
         let alone = alone.map(|alone| ratio("alone", alone)).transpose()?;
-        let (told, squares) = match &excess {
+        let (mut told, squares) = match &excess {
             ExcessLike::Whole(whole) => (whole.excess, whole.squares.as_slice()),
             ExcessLike::Ratio(value) => (Excess::new(ratio("an excess", *value)?), [].as_slice()),
         };
-        self.lock().told()?.tell(told.with_alone(alone.or(told.alone)), squares);
+        told.alone = alone.or(told.alone);
+        self.lock().told()?.tell(told, squares);
         Ok(())
     }
 

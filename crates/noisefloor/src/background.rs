@@ -189,13 +189,7 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// # Errors
     /// [`SessionError::Image`] if its size is not the image's, and what failed in the background.
     pub fn push_image(&self, spp: u64, image: Vec<Rgb>) -> Result<(), SessionError> {
-        self.check_image(&image)?;
-        self.add(Push { of: Of::Image, spp, mean: image })
-    }
-
-    fn check_image(&self, image: &[Rgb]) -> Result<(), SessionError> {
-        let (got, expected) = (image.len(), self.grid.width() * self.grid.height());
-        if got == expected { Ok(()) } else { Err(SessionError::Image { got, expected }) }
+        self.add_image(Of::Image, spp, image)
     }
 
     /// As [`Session::push_running_image`], later: the mean of all `total` samples per pixel so far. Tiles that are done by
@@ -204,8 +198,16 @@ impl<C: StoppingCriterion + Send + 'static> Background<C> {
     /// # Errors
     /// As of [`Background::push_image`].
     pub fn push_running_image(&self, total: u64, image: Vec<Rgb>) -> Result<(), SessionError> {
-        self.check_image(&image)?;
-        self.add(Push { of: Of::Running, spp: total, mean: image })
+        self.add_image(Of::Running, total, image)
+    }
+
+    fn add_image(&self, of: Of, spp: u64, mean: Vec<Rgb>) -> Result<(), SessionError> {
+        let (got, expected) = (mean.len(), self.grid.width() * self.grid.height());
+        if got == expected {
+            self.add(Push { of, spp, mean })
+        } else {
+            Err(SessionError::Image { got, expected })
+        }
     }
 
     /// As [`Session::push`], later. A tile that is done by then has the samples at the end.

@@ -1,7 +1,15 @@
 //! What tests of several modules share.
 
 use crate::criterion::{CriterionError, Needs, StoppingCriterion, Verdict, View};
+use crate::session::Session;
 use crate::tile::Tile;
+
+/// All that a session knows, as a checkpoint has it.
+pub(crate) fn saved<C: StoppingCriterion>(session: &Session<C>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    session.checkpoint("job").unwrap().write(&mut bytes).unwrap();
+    bytes
+}
 
 /// A criterion that is a function of the tiles that are due, and cannot be saved.
 struct Whim<F>(Needs, F);

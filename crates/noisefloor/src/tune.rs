@@ -81,29 +81,9 @@ pub enum Knob {
 }
 
 /// Why a range cannot be searched.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum KnobError {
-    /// Samples.
-    #[error("samples are sought between {least} and {most}: at least 2, and the second not below the first")]
-    Samples {
-        /// The least.
-        least: u64,
-        /// The most.
-        most: u64,
-    },
-    /// Thresholds.
-    #[error(
-        "a threshold is sought from {coarsest} down to {finest}: both must be positive, \
-         the first not below the second and at most 10⁹ times it"
-    )]
-    Threshold {
-        /// The coarsest.
-        coarsest: f64,
-        /// The finest.
-        finest: f64,
-    },
-}
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{0}")]
+pub struct KnobError(String);
 
 impl Knob {
     /// `samples` or `threshold`.
@@ -117,7 +97,9 @@ impl Knob {
     fn check(self) -> Result<(), KnobError> {
         match self {
             Self::Samples { least, most } if least < 2 || most / 2 < least.div_ceil(2) => {
-                Err(KnobError::Samples { least, most })
+                Err(KnobError(format!(
+                    "samples are sought between {least} and {most}: at least 2, and the second not below the first"
+                )))
             }
             Self::Threshold { coarsest, finest }
                 if !(finest > 0.0
@@ -125,7 +107,10 @@ impl Knob {
                     && coarsest.is_finite()
                     && coarsest / finest <= WIDEST) =>
             {
-                Err(KnobError::Threshold { coarsest, finest })
+                Err(KnobError(format!(
+                    "a threshold is sought from {coarsest} down to {finest}: both must be positive, \
+                     the first not below the second and at most 10⁹ times it"
+                )))
             }
             _ => Ok(()),
         }
@@ -210,30 +195,6 @@ impl Excess {
     pub fn new(ratio: f64) -> Self {
         let ratio = if ratio >= 0.0 { ratio } else { f64::INFINITY };
         Self { ratio, place: None, pictures: 0, alone: None, floor: 0.0 }
-    }
-
-    /// The same with [`Excess::place`].
-    #[must_use]
-    pub fn at(self, place: Option<(usize, usize)>) -> Self {
-        Self { place, ..self }
-    }
-
-    /// The same with [`Excess::pictures`].
-    #[must_use]
-    pub fn of_pictures(self, pictures: u64) -> Self {
-        Self { pictures, ..self }
-    }
-
-    /// The same with [`Excess::alone`].
-    #[must_use]
-    pub fn with_alone(self, alone: Option<f64>) -> Self {
-        Self { alone, ..self }
-    }
-
-    /// The same with [`Excess::floor`].
-    #[must_use]
-    pub fn with_floor(self, floor: f64) -> Self {
-        Self { floor, ..self }
     }
 
     /// Whether nearly all noise is of pixels that have the fewest samples that the renderer takes: until others have more, a
@@ -502,7 +463,7 @@ impl PicturePair {
         let all: Vec<(f64, f64)> = squares.par_iter().map(of_square).collect();
         // What is worst in one picture need not be worst in the mean
         let worst = all.into_iter().reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
-        worst.map_or(excess, |(alone, floor)| excess.with_alone(Some(alone)).with_floor(floor))
+        worst.map_or(excess, |(alone, floor)| Excess { alone: Some(alone), floor, ..excess })
     }
 
     /// A number that follows from the pictures, whichever comes first (FNV-1a, of parts and then of their numbers); not 0.
@@ -756,10 +717,15 @@ mod tests {
 
     fn search(knob: Knob, excess: impl Fn(f64) -> Excess) -> (Ending, Vec<Step>) {
         let mut tuning = Tuning::new(knob).unwrap();
+        (finish(&mut tuning, |each| excess(knob.of_both(each))), tuning.steps)
+    }
+
+    /// Goes on to the end; `excess` is that of two pictures which are rendered with this setting each.
+    fn finish(tuning: &mut Tuning, excess: impl Fn(f64) -> Excess) -> Ending {
         for _ in 0..20 {
             match tuning.next() {
-                Next::Render { setting, .. } => tuning.tell(excess(setting)),
-                Next::Done(ending) => return (ending, tuning.steps),
+                Next::Render { each, .. } => tuning.tell(excess(each)),
+                Next::Done(ending) => return ending,
             }
         }
         panic!("no end after {:?}", tuning.steps);
@@ -944,24 +910,19 @@ mod tests {
         let law = |threshold| mixed(fewest, decades, power, threshold);
         // What may be seen, as a share of what the coarsest threshold leaves
         let needed = law(0.2).1 * share;
-        let mut cost = 0.0;
-        let ending = loop {
-            match tuning.next() {
-                Next::Render { each, .. } => {
-                    let of_each = if told == Told::Halved { fewest / 2.0 } else { fewest };
-                    let (samples, wrong, followed) = mixed(of_each, decades, power, each);
-                    cost += 2.0 * samples;
-                    let ratio = wrong / needed / 2f64.powf(power / 2.0);
-                    let alone = match told {
-                        Told::Nothing => None,
-                        Told::Alone => Some(ratio * (2.0 - followed).sqrt()),
-                        Told::Halved => Some(ratio),
-                    };
-                    tuning.tell(Excess::new(ratio).with_alone(alone));
-                }
-                Next::Done(ending) => break ending,
-            }
-        };
+        let of_each = if told == Told::Halved { fewest / 2.0 } else { fewest };
+        let ending = finish(&mut tuning, |each| {
+            let (_, wrong, followed) = mixed(of_each, decades, power, each);
+            let ratio = wrong / needed / 2f64.powf(power / 2.0);
+            let alone = match told {
+                Told::Nothing => None,
+                Told::Alone => Some(ratio * (2.0 - followed).sqrt()),
+                Told::Halved => Some(ratio),
+            };
+            Excess { alone, ..Excess::new(ratio) }
+        });
+        let cost: f64 =
+            tuning.steps.iter().map(|step| 2.0 * mixed(of_each, decades, power, step.each).0).sum();
         let Ending::Found { setting, .. } = ending else { panic!("{ending:?}") };
         let (samples, wrong, _) = law(setting);
         assert!(wrong <= 1.001 * needed, "{} of {fewest}, {decades}, {power}, {share}", wrong / needed);
@@ -1024,12 +985,7 @@ mod tests {
         }
         let Next::Render { each: met, .. } = tuning.next() else { panic!("{tuning:?}") };
         let law = |each: f64| 2.0 * each / met;
-        let ending = loop {
-            match tuning.next() {
-                Next::Render { each, .. } => tuning.tell(followed(law(each))),
-                Next::Done(ending) => break ending,
-            }
-        };
+        let ending = finish(&mut tuning, |each| followed(law(each)));
         let Ending::Found { setting, .. } = ending else { panic!("{ending:?}") };
         assert!(law(setting * SQRT_2) <= 1.0, "{tuning:?}");
     }
@@ -1038,13 +994,13 @@ mod tests {
     fn pixels_with_the_most_samples_end_a_search_that_they_keep_from_passing() {
         for (floor, ends) in [(0.0, false), (0.99, false), (1.01, true)] {
             let mut tuning = Tuning::new(THRESHOLD).unwrap();
-            tuning.tell(followed(2.0).with_floor(floor));
+            tuning.tell(Excess { floor, ..followed(2.0) });
             let ended = tuning.next() == Next::Done(Ending::Capped { ratio: 2.0 });
             assert_eq!(ended, ends, "{floor}");
         }
         // What is good enough is so whatever holds the rest
         let mut tuning = Tuning::new(THRESHOLD).unwrap();
-        tuning.tell(Excess::new(0.7).with_alone(Some(0.99)).with_floor(0.99));
+        tuning.tell(Excess { alone: Some(0.99), floor: 0.99, ..Excess::new(0.7) });
         assert!(matches!(tuning.next(), Next::Done(Ending::Found { .. })));
     }
 

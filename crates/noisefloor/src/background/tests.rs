@@ -2,7 +2,7 @@ use super::*;
 use crate::checkpoint::Checkpoint;
 use crate::criterion::{CriterionError, FixedSpp, Needs, Verdict, View};
 use crate::params::{Params, Schedule};
-use crate::tests::judging;
+use crate::tests::{judging, saved};
 use crate::watch::Fault;
 use noisefloor_testkit::Noise;
 use proptest::prelude::*;
@@ -36,19 +36,12 @@ fn passes(grid: TileGrid, seed: u64, count: usize) -> Vec<Handed> {
     (0..count).map(&mut handed).collect()
 }
 
-fn of_tile(grid: TileGrid, tile: Tile, image: &[Rgb]) -> Vec<Rgb> {
-    tile.rows(grid.width()).flat_map(|row| image[row].to_vec()).collect()
-}
-
 /// The session that waits, which gives open tiles what they get here.
 fn waiting<C: StoppingCriterion>(session: &mut Session<C>, passes: &[Handed]) -> Vec<Stop> {
-    let grid = session.film().grid();
     let mut stops = Vec::new();
     for Handed { spp, images, .. } in passes {
         for (spp, image) in spp.iter().zip(images) {
-            for tile in grid.tiles().filter(|tile| session.is_open(tile.index)).collect::<Vec<_>>() {
-                session.push(tile.index, *spp, &of_tile(grid, tile, image)).unwrap();
-            }
+            session.push_image(*spp, image).unwrap();
         }
         stops.extend(session.judge().unwrap());
     }
@@ -61,7 +54,8 @@ fn hand_over<C: StoppingCriterion + Send + 'static>(background: &Background<C>, 
         for (spp, image) in spp.iter().zip(images) {
             if *by_tile {
                 grid.tiles().for_each(|tile| {
-                    background.push(tile.index, *spp, of_tile(grid, tile, image)).unwrap();
+                    let mean = tile.rows(grid.width()).flat_map(|row| image[row].to_vec()).collect();
+                    background.push(tile.index, *spp, mean).unwrap();
                 });
             } else {
                 let mut buffer = background.buffer();
@@ -71,12 +65,6 @@ fn hand_over<C: StoppingCriterion + Send + 'static>(background: &Background<C>, 
         }
         background.judge().unwrap();
     }
-}
-
-fn saved<C: StoppingCriterion>(session: &Session<C>) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    session.checkpoint("job").unwrap().write(&mut bytes).unwrap();
-    bytes
 }
 
 fn fresh(grid: TileGrid) -> Session<crate::Oracle> {

@@ -3,7 +3,7 @@ use crate::criterion::{FixedSpp, Needs, StoppingCriterion, Verdict};
 use crate::driver::{Driver, Event};
 use crate::oracle::Oracle;
 use crate::source::{Batch, ProgressiveSource, Repeats, Request, SourceError, SourceInfo};
-use crate::tests::judging_each;
+use crate::tests::{judging_each, saved};
 use proptest::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -48,21 +48,12 @@ fn broken_off<C: StoppingCriterion>(criterion: C, batches: usize) -> Driver<Nois
 
 fn broken_off_with<C: StoppingCriterion>(criterion: C, params: Params, batches: usize) -> Driver<Noise, C> {
     let mut driver = Driver::new(Noise(Repeats::Samples), criterion, params).unwrap();
-    let (cancel, mut left) = (driver.cancel_flag(), batches);
-    let mut count = |event: &Event| {
-        if matches!(event, Event::BatchDone(_)) {
-            left = left.saturating_sub(1);
-            cancel.store(left == 0, Ordering::Relaxed);
-        }
-    };
-    driver.run(|_, event| count(event)).unwrap();
+    assert_eq!(run_for(&mut driver, batches), None);
     driver
 }
 
-fn kept<C: StoppingCriterion>(driver: &Driver<Noise, C>) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    driver.session().checkpoint("noise").unwrap().write(&mut bytes).unwrap();
-    bytes
+fn kept<S: ProgressiveSource, C: StoppingCriterion>(driver: &Driver<S, C>) -> Vec<u8> {
+    saved(driver.session())
 }
 
 /// Resumed with a larger limit, a finished render goes on; where verdicts come at the same samples whatever the limit, as
@@ -78,11 +69,11 @@ fn a_finished_run_goes_on_with_more_samples() {
     limited.run(|_, _| ()).unwrap();
     assert!(limited.session().stops().any(|stop| stop.reason == crate::StopReason::MaxSpp));
     let bytes = kept(&limited);
-    let mut resumed = with(400).unwrap().resume("noise", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+    let mut resumed = with(400).unwrap().resume("job", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
     assert!(!resumed.session().is_done());
     resumed.run(|_, _| ()).unwrap();
     assert!(kept(&resumed) == kept(&whole));
-    let smaller = with(80).unwrap().resume("noise", Checkpoint::read(&bytes[..]).unwrap());
+    let smaller = with(80).unwrap().resume("job", Checkpoint::read(&bytes[..]).unwrap());
     let words = smaller.map(drop).unwrap_err().to_string();
     assert!(words.contains("its most samples per pixel is 100, not 80"), "{words}");
 }
@@ -99,7 +90,7 @@ fn goes_on_with<C: StoppingCriterion>(kept_with: C, more: C, less: C) {
     let bytes = kept(&before);
     let resume = |criterion: C| {
         let fresh = Driver::new(Noise(Repeats::Samples), criterion, params()).unwrap();
-        fresh.resume("noise", Checkpoint::read(&bytes[..]).unwrap())
+        fresh.resume("job", Checkpoint::read(&bytes[..]).unwrap())
     };
     let words = resume(less).map(drop).unwrap_err().to_string();
     assert!(words.contains(&kept_less), "{words}");
@@ -163,7 +154,10 @@ impl ProgressiveSource for Habitual {
 }
 
 /// Runs up to so many batches; what it says at the end, if that is wrong.
-fn run_for<C: StoppingCriterion>(driver: &mut Driver<Habitual, C>, batches: usize) -> Option<String> {
+fn run_for<S: ProgressiveSource, C: StoppingCriterion>(
+    driver: &mut Driver<S, C>,
+    batches: usize,
+) -> Option<String> {
     let (cancel, mut left) = (driver.cancel_flag(), batches);
     let outcome = driver.run(|_, event| {
         if matches!(event, Event::BatchDone(_)) {
@@ -178,11 +172,6 @@ fn run_for<C: StoppingCriterion>(driver: &mut Driver<Habitual, C>, batches: usiz
 fn a_checkpoint_equals_none<C: StoppingCriterion>(criterion: impl Fn() -> C, habit: Habit) -> Vec<String> {
     let params = Params { tile: 16, max_spp: 96, ..Params::default() };
     let new = || Driver::new(Habitual(habit), criterion(), params.clone()).unwrap();
-    let kept = |driver: &Driver<Habitual, C>| {
-        let mut bytes = Vec::new();
-        driver.session().checkpoint("job").unwrap().write(&mut bytes).unwrap();
-        bytes
-    };
     let mut whole = new();
     let outcome = run_for(&mut whole, usize::MAX);
     let said: Vec<String> =
@@ -250,7 +239,7 @@ fn an_oracle_takes_up_no_nonsense() {
 fn what_is_done_stays_done() {
     let bytes = kept(&broken_off(FixedSpp(40), usize::MAX));
     let driver = Driver::new(Noise(Repeats::Samples), FixedSpp(40), params()).unwrap();
-    let driver = driver.resume("noise", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
+    let driver = driver.resume("job", Checkpoint::read(&bytes[..]).unwrap()).unwrap();
     assert!(driver.session().is_done());
 }
 
@@ -267,11 +256,11 @@ fn another_job_is_refused() {
         let error = error.unwrap();
         assert!(error.starts_with(with), "{error}");
     };
-    assert_eq!(refused(Repeats::Samples, 40, params(), "noise"), None);
+    assert_eq!(refused(Repeats::Samples, 40, params(), "job"), None);
     begins(refused(Repeats::Samples, 40, params(), "silence"), &other("job"));
-    begins(refused(Repeats::Samples, 30, params(), "noise"), &other("criterion"));
+    begins(refused(Repeats::Samples, 30, params(), "job"), &other("criterion"));
     begins(
-        refused(Repeats::Samples, 40, Params { consecutive: 2, ..params() }, "noise"),
+        refused(Repeats::Samples, 40, Params { consecutive: 2, ..params() }, "job"),
         &other("number of verdicts in a row is 1, not 2"),
     );
     let other_model = {
@@ -279,10 +268,10 @@ fn another_job_is_refused() {
         let checkpoint = Checkpoint::read(&kept(&driver)[..]).unwrap();
         let laxer = Oracle::new(crate::Model::bundled(), crate::People::new(0.9).unwrap());
         let driver = Driver::new(Noise(Repeats::Samples), laxer, params()).unwrap();
-        driver.resume("noise", checkpoint).err().map(|e| e.to_string())
+        driver.resume("job", checkpoint).err().map(|e| e.to_string())
     };
     begins(other_model, &other("criterion"));
-    begins(refused(Repeats::Calls, 40, params(), "noise"), "noise cannot be resumed");
+    begins(refused(Repeats::Calls, 40, params(), "job"), "noise cannot be resumed");
 }
 
 /// A curve of the caller's own is not in the checkpoint; the program that resumes has it.
@@ -299,7 +288,7 @@ fn a_tone_curve_is_resumed_with_its_function() {
         shown.into_iter().for_each(|display| driver.session_mut().set_display(display).unwrap());
         let bytes = kept(&driver);
         let driver = Driver::new(Noise(Repeats::Samples), FixedSpp(40), with).unwrap();
-        driver.resume("noise", Checkpoint::read(&bytes[..]).unwrap())
+        driver.resume("job", Checkpoint::read(&bytes[..]).unwrap())
     };
     let resumed = resume(params(root.clone()), None, params(root.clone())).unwrap();
     assert_eq!(resumed.session().display().unwrap().encode([0.25; 3]), [0.5; 3]);
@@ -320,11 +309,11 @@ fn another_source_is_refused() {
         now.add("hall.xml", contents);
         let mut kept = crate::source::SourceIdentity::new("noise");
         kept.add("hall.xml", b"lamps");
-        let mut checkpoint = driver.session().checkpoint("noise").unwrap();
+        let mut checkpoint = driver.session().checkpoint("job").unwrap();
         checkpoint.source = Cow::Owned(kept);
         let mut session = crate::Session::new(96, 48, FixedSpp(40), params()).unwrap();
         session.set_source(now);
-        session.resume("noise", checkpoint).map(drop).map_err(|e| e.to_string())
+        session.resume("job", checkpoint).map(drop).map_err(|e| e.to_string())
     };
     assert_eq!(resumed("noise", b"lamps"), Ok(()));
     let error = |what: &str| Err(format!("the checkpoint belongs to another job: {what}"));
@@ -336,10 +325,10 @@ fn another_source_is_refused() {
 fn what_does_not_hold_together_is_refused() {
     let driver = broken_off(FixedSpp(40), 1);
     let refused = |change: &dyn Fn(&mut Checkpoint<'_>)| {
-        let mut checkpoint = driver.session().checkpoint("noise").unwrap();
+        let mut checkpoint = driver.session().checkpoint("job").unwrap();
         change(&mut checkpoint);
         let driver = Driver::new(Noise(Repeats::Samples), FixedSpp(40), params()).unwrap();
-        matches!(driver.resume("noise", checkpoint), Err(CheckpointError::Invalid(_)))
+        matches!(driver.resume("job", checkpoint), Err(CheckpointError::Invalid(_)))
     };
     assert!(!refused(&|_| ()));
     assert!(refused(&|c| c.tiles.to_mut().truncate(3)));
@@ -384,7 +373,7 @@ proptest! {
 #[test]
 fn a_film_is_believed_as_far_as_it_comes() {
     let driver = broken_off(FixedSpp(40), 1);
-    let mut checkpoint = driver.session().checkpoint("noise").unwrap();
+    let mut checkpoint = driver.session().checkpoint("job").unwrap();
     let mut file = Vec::new();
     checkpoint.film = Cow::Owned(Film::new(crate::TileGrid::new(96, 48, 16).unwrap()));
     checkpoint.write(&mut file).unwrap();
@@ -413,7 +402,7 @@ fn head(file: &[u8]) -> usize {
 fn a_criterion_that_keeps_its_state_to_itself_is_not_resumed() {
     let whim = || judging_each(Needs::default(), |_, _| Verdict::default());
     let driver = broken_off(whim(), 1);
-    let said = driver.session().checkpoint("noise").unwrap_err().to_string();
+    let said = driver.session().checkpoint("job").unwrap_err().to_string();
     assert!(said.contains("a whim cannot be resumed"), "{said}");
     assert!(!whim().restore(driver.session().film().grid(), &[]));
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::criterion::{FixedSpp, Needs};
 use crate::params::Schedule;
-use crate::tests::judging;
+use crate::tests::{judging, saved};
 
 /// Says "converged" from given samples on, with halves or without.
 struct From {
@@ -240,10 +240,8 @@ fn images_are_tiles_one_by_one_whatever_the_threads() {
         }
         session
     };
-    let saved = |session: &Session<crate::Oracle>| {
-        let mut bytes = Vec::new();
-        session.checkpoint("job").unwrap().write(&mut bytes).unwrap();
-        (bytes, session.film().rejected(), session.negative_samples())
+    let all = |session: &Session<crate::Oracle>| {
+        (saved(session), session.film().rejected(), session.negative_samples())
     };
     let batches = || (0..9).map(|k| ([8, 8, 5, 16, 40][k % 5], image(k as u64)));
     let mut one_by_one = new();
@@ -258,7 +256,7 @@ fn images_are_tiles_one_by_one_whatever_the_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mut whole = new();
         batches().for_each(|(spp, image)| pool.install(|| whole.push_image(spp, &image)).unwrap());
-        assert!(saved(&whole) == saved(&one_by_one), "{threads} threads");
+        assert!(all(&whole) == all(&one_by_one), "{threads} threads");
     }
 }
 

@@ -291,15 +291,12 @@ impl Search {
 
     /// Crops around the worst squares, none of them in the middle of another.
     fn choose(&self, seen: &[Seen]) -> Vec<Place> {
-        let edge =
-            |of: &Seen, end: fn(&Tile) -> usize| of.squares.iter().map(|(square, _)| end(square)).max();
         let mut all: Vec<(usize, [usize; 2], Tile, f64)> = Vec::new();
         for of in seen {
-            let sides: [fn(&Tile) -> usize; 2] = [
-                |square| square.x.saturating_add(square.width),
-                |square| square.y.saturating_add(square.height),
-            ];
-            let size = sides.map(|end| edge(of, end).unwrap_or(0));
+            let ends = of.squares.iter().map(|(square, _)| {
+                [square.x.saturating_add(square.width), square.y.saturating_add(square.height)]
+            });
+            let size = ends.fold([0; 2], |[x, y], end| [x.max(end[0]), y.max(end[1])]);
             all.extend(of.squares.iter().map(|&(square, ratio)| (of.place.view, size, square, ratio)));
         }
         all.sort_by(|a, b| b.3.total_cmp(&a.3));

@@ -89,15 +89,9 @@ fn fed(
     let mut had = 0;
     for count in 0.. {
         let (new, image) = picture(count);
-        for tile in session.film().grid().tiles().collect::<Vec<_>>() {
-            let mean: Vec<Rgb> = tile.rows(EDGE).flat_map(|row| image[row].to_vec()).collect();
-            match session.push(tile.index, new, &mean) {
-                Err(SessionError::Fault(fault)) => return (Some(fault), had, session.warnings().to_vec()),
-                other => other.unwrap(),
-            }
-        }
-        had += new;
-        match session.judge() {
+        let pushed = session.push_image(new, &image);
+        had += if pushed.is_ok() { new } else { 0 };
+        match pushed.and_then(|()| session.judge()) {
             Err(SessionError::Fault(fault)) => return (Some(fault), had, session.warnings().to_vec()),
             other => drop(other.unwrap()),
         }
@@ -165,11 +159,7 @@ fn running_means_in_the_batches_asked_for_stop_no_tile() {
         let spp = session.requests()[0].spp;
         sum = mixed(1.0, &sum, spp as f32, &batch(seed, spp));
         had += spp;
-        for tile in session.film().grid().tiles().collect::<Vec<_>>() {
-            let mean =
-                tile.rows(EDGE).flat_map(|row| mixed(1.0 / had as f32, &sum[row.clone()], 0.0, &sum[row]));
-            session.push(tile.index, spp, &mean.collect::<Vec<_>>()).unwrap();
-        }
+        session.push_image(spp, &mixed(1.0 / had as f32, &sum, 0.0, &sum)).unwrap();
         match session.judge() {
             Ok(stops) => {
                 assert_eq!(stops, [], "{had}");
@@ -255,10 +245,7 @@ fn a_pixel_filter_is_a_warning_unless_it_was_announced() {
     for count in 0..8 {
         let mut image = batch(count + 1, SPP);
         blur(&mut image);
-        for tile in session.film().grid().tiles().collect::<Vec<_>>() {
-            let mean: Vec<Rgb> = tile.rows(EDGE).flat_map(|row| image[row].to_vec()).collect();
-            session.push(tile.index, SPP, &mean).unwrap();
-        }
+        session.push_image(SPP, &image).unwrap();
         session.judge().unwrap();
     }
     assert_eq!(session.warnings(), []);
@@ -650,11 +637,7 @@ fn running_means_in_half_floats_are_a_fault() {
         if n % 64 != 0 {
             return None;
         }
-        let grid = session.film().grid();
-        for tile in grid.tiles() {
-            let part: Vec<Rgb> = tile.rows(32).flat_map(|row| mean[row].to_vec()).collect();
-            session.push_running(tile.index, n, &part).unwrap();
-        }
+        session.push_running_image(n, &mean).unwrap();
         session.judge().err().map(|error| (n, error))
     });
     let stops: Vec<_> = session.stops().collect();
@@ -677,10 +660,7 @@ fn counts_that_are_behind_the_picture_are_noticed() {
             for n in (16..=80).step_by(16) {
                 let bright = if sums { (n + ahead) as f32 / n as f32 } else { 1.0 };
                 let image = mixed(bright, &room.mean(0, n + ahead), 0.0, &room.mean(0, 1));
-                for tile in session.film().grid().tiles() {
-                    let part: Vec<Rgb> = tile.rows(96).flat_map(|row| image[row].to_vec()).collect();
-                    session.push_running(tile.index, n, &part).unwrap();
-                }
+                session.push_running_image(n, &image).unwrap();
                 session.look().unwrap();
             }
             session.warnings().to_vec()

@@ -289,9 +289,10 @@ impl<'a> Tune<'a> {
 
 impl Row {
     fn excess(&self) -> Excess {
-        let ratio = self.ratio.unwrap_or(f64::INFINITY);
-        let excess = Excess::new(ratio).at(self.x.zip(self.y)).of_pictures(self.pictures);
-        excess.with_alone(self.alone).with_floor(self.floor)
+        let mut excess = Excess::new(self.ratio.unwrap_or(f64::INFINITY));
+        (excess.place, excess.pictures) = (self.x.zip(self.y), self.pictures);
+        (excess.alone, excess.floor) = (self.alone, self.floor);
+        excess
     }
 }
 
