@@ -196,92 +196,60 @@ impl WriteFault {
 
 /// Why a folder is not a stack, or cannot be played back.
 #[derive(Debug, Error)]
+#[error("{}: {fault}", path.display())]
+pub struct StackError {
+    /// The folder, or the image that is wrong.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub fault: StackFault,
+}
+
+/// What is wrong with a stack.
+#[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum StackError {
+pub enum StackFault {
     /// The folder cannot be listed.
-    #[error("{}: cannot list the folder: {source}; check the path and its permissions", dir.display())]
-    Folder {
-        /// The folder.
-        dir: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
-    /// An image of the stack cannot be read.
-    #[error("{}: cannot be read: {source}", path.display())]
-    Unreadable {
-        /// The image.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+    #[error("cannot list the folder: {0}; check the path and its permissions")]
+    Folder(io::Error),
     /// No image in the folder is named as one of a stack.
     #[error(
-        "{}: no stack here; name images by their samples per pixel (00100.png, 00100.exr) \
-         or batch_<first>_<last>.exr",
-        dir.display()
+        "no stack here; name images by their samples per pixel (00100.png, 00100.exr) \
+         or batch_<first>_<last>.exr"
     )]
-    Nothing {
-        /// The folder.
-        dir: PathBuf,
-    },
+    Nothing,
     /// The folder holds images of both layouts.
-    #[error("{}: holds both running means and batch_*.exr; keep them in separate folders", dir.display())]
-    Ambiguous {
-        /// The folder.
-        dir: PathBuf,
-    },
-    /// A name that does not say which samples are in the image.
+    #[error("holds both running means and batch_*.exr; keep them in separate folders")]
+    Ambiguous,
+    /// A name that does not say which samples are in the image, and why.
     #[error(
-        "{}: {why}; expected NNNNN.png or NNNNN.exr with at least 1 sample, \
-         or batch_<first>_<last>.exr with first < last",
-        path.display()
+        "{0}; expected NNNNN.png or NNNNN.exr with at least 1 sample, \
+         or batch_<first>_<last>.exr with first < last"
     )]
-    Name {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with its name.
-        why: &'static str,
-    },
-    /// The first batch does not start at sample 0.
-    #[error("{}: the first batch starts at sample {first}, not 0; add the batches before it", path.display())]
-    Start {
-        /// The first batch.
-        path: PathBuf,
-        /// Where it starts.
-        first: u64,
-    },
-    /// Samples are missing between two batches.
+    Name(&'static str),
+    /// The first batch does not start at sample 0, but here.
+    #[error("the first batch starts at sample {0}, not 0; add the batches before it")]
+    Start(u64),
+    /// Samples are missing between a batch and the next.
     #[error(
-        "samples {from} to {to} are missing between {} and {}; add the batch or remove all after it",
-        before.display(),
-        after.display()
+        "samples {from} to {to} are missing between this batch and {}; add the batch or remove all after it",
+        next.display()
     )]
     Gap {
-        /// The batch before the gap.
-        before: PathBuf,
-        /// The batch after it.
-        after: PathBuf,
+        /// The batch after the gap.
+        next: PathBuf,
         /// Samples before the gap.
         from: u64,
         /// Samples before the next batch.
         to: u64,
     },
-    /// Two images hold the same samples.
-    #[error("{} and {} hold the same samples; remove one", one.display(), other.display())]
-    Overlap {
-        /// One image.
-        one: PathBuf,
-        /// The other.
-        other: PathBuf,
-    },
+    /// Another image holds the same samples.
+    #[error("holds samples that are in {}, too; remove one", .0.display())]
+    Overlap(PathBuf),
     /// An image differs in size from the rest of its stack.
     #[error(
-        "{}: {}×{} pixels, but its stack has {}×{}; render it again at that size",
-        path.display(), got.0, got.1, size.0, size.1
+        "{}×{} pixels, but its stack has {}×{}; render it again at that size", got.0, got.1, size.0, size.1
     )]
     Size {
-        /// The image.
-        path: PathBuf,
         /// The stack's width and height in pixels.
         size: (usize, usize),
         /// The image's.
@@ -311,5 +279,18 @@ pub enum StackError {
     },
     /// An image could not be read.
     #[error(transparent)]
-    Picture(#[from] PictureError),
+    Picture(PictureFault),
+}
+
+impl StackFault {
+    /// What is wrong with this folder or image.
+    pub fn of(self, path: &Path) -> StackError {
+        StackError { path: path.to_owned(), fault: self }
+    }
+}
+
+impl From<PictureError> for StackError {
+    fn from(PictureError { path, fault }: PictureError) -> Self {
+        Self { path, fault: StackFault::Picture(fault) }
+    }
 }

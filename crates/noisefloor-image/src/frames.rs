@@ -1,6 +1,6 @@
 //! Which samples are in which file, by file names.
 
-use crate::error::StackError;
+use crate::error::{StackError, StackFault};
 use std::path::{Path, PathBuf};
 
 /// What the images of a stack hold.
@@ -33,23 +33,20 @@ pub fn running_means(dir: &Path) -> Result<Vec<Frame>, StackError> {
     for path in files(dir)? {
         let Some(digits) = running_mean_name(&path) else { continue };
         let last = match digits.parse::<u32>() {
-            Ok(0) => return Err(StackError::Name { path, why: "an image of no samples" }),
+            Ok(0) => return Err(StackFault::Name("an image of no samples").of(&path)),
             Ok(last) => u64::from(last),
-            Err(_) => return Err(StackError::Name { path, why: "the number of samples is too large" }),
+            Err(_) => return Err(StackFault::Name("the number of samples is too large").of(&path)),
         };
         frames.push(Frame { first: 0, last, path });
     }
     frames.sort_by_key(|frame| frame.last);
     for i in 1..frames.len() {
         if frames[i].last == frames[i - 1].last {
-            return Err(StackError::Overlap {
-                one: frames[i - 1].path.clone(),
-                other: frames[i].path.clone(),
-            });
+            return Err(StackFault::Overlap(frames[i].path.clone()).of(&frames[i - 1].path));
         }
         frames[i].first = frames[i - 1].last;
     }
-    if frames.is_empty() { Err(StackError::Nothing { dir: dir.to_owned() }) } else { Ok(frames) }
+    if frames.is_empty() { Err(StackFault::Nothing.of(dir)) } else { Ok(frames) }
 }
 
 /// The batches of a folder, by ascending samples: from 0, without gaps or overlaps. Other files are ignored.
@@ -63,27 +60,27 @@ pub fn batches(dir: &Path) -> Result<Vec<Frame>, StackError> {
         let Some(range) = batch_name(&path) else { continue };
         let ends = range.split_once('_').and_then(|(a, b)| Some((count(a)?, count(b)?)));
         let Some((first, last)) = ends else {
-            return Err(StackError::Name { path, why: "it does not say which samples the batch holds" });
+            return Err(StackFault::Name("it does not say which samples the batch holds").of(&path));
         };
         if first >= last {
-            return Err(StackError::Name { path, why: "a batch of no samples" });
+            return Err(StackFault::Name("a batch of no samples").of(&path));
         }
         frames.push(Frame { first, last, path });
     }
     frames.sort_by_key(|frame| (frame.first, frame.last));
 
-    let Some(start) = frames.first() else { return Err(StackError::Nothing { dir: dir.to_owned() }) };
+    let Some(start) = frames.first() else { return Err(StackFault::Nothing.of(dir)) };
     if start.first != 0 {
-        return Err(StackError::Start { path: start.path.clone(), first: start.first });
+        return Err(StackFault::Start(start.first).of(&start.path));
     }
     for pair in frames.windows(2) {
         let (one, other) = (&pair[0], &pair[1]);
         if other.first > one.last {
-            let (before, after) = (one.path.clone(), other.path.clone());
-            return Err(StackError::Gap { before, after, from: one.last, to: other.first });
+            let next = other.path.clone();
+            return Err(StackFault::Gap { next, from: one.last, to: other.first }.of(&one.path));
         }
         if other.first < one.last {
-            return Err(StackError::Overlap { one: one.path.clone(), other: other.path.clone() });
+            return Err(StackFault::Overlap(other.path.clone()).of(&one.path));
         }
     }
     Ok(frames)
@@ -97,13 +94,13 @@ pub(crate) fn detect(dir: &Path) -> Result<Layout, StackError> {
     match (running, batches) {
         (true, false) => Ok(Layout::RunningMeans),
         (false, true) => Ok(Layout::Batches),
-        (true, true) => Err(StackError::Ambiguous { dir: dir.to_owned() }),
-        (false, false) => Err(StackError::Nothing { dir: dir.to_owned() }),
+        (true, true) => Err(StackFault::Ambiguous.of(dir)),
+        (false, false) => Err(StackFault::Nothing.of(dir)),
     }
 }
 
 fn files(dir: &Path) -> Result<Vec<PathBuf>, StackError> {
-    let failed = |source| StackError::Folder { dir: dir.to_owned(), source };
+    let failed = |source| StackFault::Folder(source).of(dir);
     std::fs::read_dir(dir).map_err(failed)?.map(|entry| Ok(entry.map_err(failed)?.path())).collect()
 }
 

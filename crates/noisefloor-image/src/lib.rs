@@ -61,7 +61,7 @@ pub use cube::read_cube;
 pub use decode_exr::read_exr;
 pub use decode_pfm::read_pfm;
 pub use decode_png::read_png;
-pub use error::{PictureError, PictureFault, StackError, WriteError, WriteFault};
+pub use error::{PictureError, PictureFault, StackError, StackFault, WriteError, WriteFault};
 pub use facts::{SampleFacts, read_facts};
 pub use frames::{Frame, batches, running_means};
 #[doc(inline)]

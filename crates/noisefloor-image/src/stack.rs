@@ -1,7 +1,7 @@
 //! A stack of images on disk, played back as a source.
 
 use crate::decode_exr::read_exr;
-use crate::error::StackError;
+use crate::error::{PictureFault, StackError, StackFault};
 use crate::frames::{self, Frame, Layout};
 use crate::picture::LinearImage;
 use crate::read::read_picture;
@@ -11,7 +11,7 @@ use noisefloor::{
 };
 use std::collections::VecDeque;
 use std::fs::File;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Images kept in memory: a running mean and the one before it.
@@ -37,6 +37,7 @@ const CACHED: usize = 2;
 #[derive(Debug)]
 pub struct StackSource {
     name: String,
+    dir: PathBuf,
     width: usize,
     height: usize,
     layout: Layout,
@@ -61,6 +62,7 @@ impl StackSource {
         let folder = dir.file_name().unwrap_or(dir.as_os_str()).to_string_lossy();
         Ok(Self {
             name: format!("stack {folder}"),
+            dir: dir.to_owned(),
             width: first.width,
             height: first.height,
             layout,
@@ -78,7 +80,7 @@ impl StackSource {
         let image = Arc::new(read(self.layout, path)?);
         if (image.width, image.height) != (self.width, self.height) {
             let (size, got) = ((self.width, self.height), (image.width, image.height));
-            return Err(StackError::Size { path: path.clone(), size, got });
+            return Err(StackFault::Size { size, got }.of(path));
         }
         while self.cache.len() >= CACHED {
             self.cache.pop_front();
@@ -97,7 +99,7 @@ impl StackSource {
             }
             let starts = self.frames.iter().map(|frame| frame.first).chain([end]);
             let near = starts.min_by_key(|start| start.abs_diff(request.first)).unwrap_or(0);
-            return Err(StackError::Boundary { first: request.first, near });
+            return Err(StackFault::Boundary { first: request.first, near }.of(&self.dir));
         };
 
         // The first running mean, and every batch, holds only new samples
@@ -123,7 +125,7 @@ impl StackSource {
         if inside(tile.x, tile.width, self.width) && inside(tile.y, tile.height, self.height) {
             return Ok(());
         }
-        Err(StackError::Tile { tile: *tile, size: (self.width, self.height) })
+        Err(StackFault::Tile { tile: *tile, size: (self.width, self.height) }.of(&self.dir))
     }
 }
 
@@ -141,7 +143,7 @@ impl ProgressiveSource for StackSource {
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
             let added = File::open(path).and_then(|file| identity.add_from(name, file));
             added.map_err(|source| {
-                let cause = StackError::Unreadable { path: path.clone(), source };
+                let cause = PictureFault::Io(source).of(path);
                 SourceError::Failed { name: self.name.clone(), tile: None, cause: Box::new(cause) }
             })?;
         }

@@ -3,7 +3,9 @@
 use super::error::CorpusError;
 use super::zone::{JudgedZone, ZoneImages};
 use noisefloor::{Rgb, internal::HALO};
-use noisefloor_image::{Frame, Picture, StackError, batches, read_exr, read_picture, running_means};
+use noisefloor_image::{
+    Frame, Picture, StackError, StackFault, batches, read_exr, read_picture, running_means,
+};
 use std::collections::VecDeque;
 
 /// Name of a scene's noise-free reference.
@@ -125,7 +127,7 @@ impl<'a> JudgedImages<'a> {
         }
         let size = *self.size.get_or_insert(got);
         if size != got {
-            return Err(StackError::Size { path: path.clone(), size, got }.into());
+            return Err(StackFault::Size { size, got }.of(path).into());
         }
         let (width, height) = size;
 

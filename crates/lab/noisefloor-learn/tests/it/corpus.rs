@@ -1,4 +1,4 @@
-use noisefloor_image::{RenderLayers, StackError, write_exr, write_png};
+use noisefloor_image::{RenderLayers, StackError, StackFault, write_exr, write_png};
 use noisefloor_learn::CorpusError;
 use noisefloor_learn::{Corpus, Encoding, Inner, JudgedZone, ZoneImages, zone_levels};
 use std::path::Path;
@@ -145,7 +145,7 @@ fn what_is_missing_is_named() {
     one_scene(folder.path());
     std::fs::remove_file(folder.path().join("zone01/batch_00000_00020.exr")).unwrap();
     let error = Corpus::open(folder.path()).unwrap_err();
-    assert!(matches!(error, CorpusError::Stack(StackError::Start { .. })), "{error}");
+    assert!(matches!(error, CorpusError::Stack(StackError { fault: StackFault::Start(_), .. })), "{error}");
     std::fs::remove_dir_all(folder.path().join("zone01")).unwrap();
     let error = Corpus::open(folder.path()).unwrap_err();
     assert!(
@@ -181,7 +181,10 @@ fn zones_must_fit_their_images() {
     write_exr(folder.path().join("Bath/00060.exr"), &RenderLayers::rgb(30, 30, &rgb)).unwrap();
     let corpus = Corpus::open(folder.path()).unwrap();
     let errors: Vec<_> = corpus.scene_levels("Bath").unwrap().filter_map(Result::err).collect();
-    assert!(matches!(&errors[..], [CorpusError::Stack(StackError::Size { .. })]), "{errors:?}");
+    assert!(
+        matches!(&errors[..], [CorpusError::Stack(StackError { fault: StackFault::Size { .. }, .. })]),
+        "{errors:?}"
+    );
 }
 
 /// Writes a grey EXR of one value.

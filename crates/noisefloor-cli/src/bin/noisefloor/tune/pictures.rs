@@ -360,7 +360,7 @@ impl<'a> Judges<'a> {
         }
         // In the whole picture
         let (x, y) = crop.map_or((0, 0), |crop| (crop.tile.x, crop.tile.y));
-        looked.excess = looked.excess.at(looked.excess.place.map(|place| (place.0 + x, place.1 + y)));
+        looked.excess.place = looked.excess.place.map(|place| (place.0 + x, place.1 + y));
         let mean = pair.mean().to_vec();
         Ok(Judged { looked, size, mean, denoised, spp: spp.map(|each| 2.0 * each) })
     }
