@@ -1,7 +1,7 @@
 //! From linear radiance to what a screen shows: exposure, tone mapping, luminance.
 
 use crate::rgb::Rgb;
-use exposure::{DELTA, LogAverage, NoisyPixel};
+use exposure::{DELTA, LogAverage};
 #[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -122,27 +122,13 @@ impl ToneMapping {
     /// reference alike: if the log-average drifted, the drift would look like noise. `pixels` are linear
     /// radiance; those that are black or not finite are skipped. A black picture gets exposure 1.
     ///
-    /// Noise bends a log-average, by a factor of 20 where most pixels have met no light yet: see
-    /// [`ToneMapping::settle_noisy`].
+    /// Noise bends a log-average, by a factor of 20 where most pixels have met no light yet: a
+    /// [`Session`](crate::Session) estimates that of the converged picture.
     ///
     /// # Panics
     /// If [`ToneMapping::check`] refuses the parameters.
     pub fn settle(&self, pixels: &[Rgb]) -> Display {
         self.settle_by(|| log_average(pixels).map(|value| LogAverage { value, error: 0.0 })).display
-    }
-
-    /// Settles the exposure that a noisy picture of this width will have once it has converged, from the
-    /// picture alone: what differs among 2×2 pixels counts as noise. Two renderings tell noise from
-    /// texture: see [`Film::settle`](crate::Film::settle).
-    ///
-    /// # Panics
-    /// If [`ToneMapping::check`] refuses the parameters.
-    pub fn settle_noisy(&self, width: usize, pixels: &[Rgb]) -> Settled {
-        let height = pixels.len().checked_div(width).unwrap_or(0);
-        let pixel = |x: usize, y: usize| {
-            Some(NoisyPixel { luminance: luminance(pixels[y * width + x]), deviation: None })
-        };
-        self.settle_by(|| exposure::estimate((width, height), pixel))
     }
 
     /// The display, by the log-average where it depends on that.
@@ -169,13 +155,11 @@ impl ToneMapping {
 
 /// A display, and how well its exposure is known.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Settled {
-    /// The display.
-    pub display: Display,
+pub(crate) struct Settled {
+    pub(crate) display: Display,
     /// Standard error of the exposure, as a share of it; 0 if it does not depend on the picture, or the
     /// picture is black.
-    pub error: f64,
+    pub(crate) error: f64,
 }
 
 /// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has

@@ -528,13 +528,12 @@ impl Film {
     }
 
     /// Settles the exposure that the picture will have once it has converged. The halves tell noise from
-    /// texture; without them, [`ToneMapping::settle_noisy`] says what does. Pixels without samples are left
+    /// texture; without them, what differs among 2×2 pixels counts as noise. Pixels without samples are left
     /// out.
     ///
     /// # Panics
     /// If [`ToneMapping::check`] refuses the parameters.
-    #[doc(hidden)]
-    pub fn settle(&self, tone: &ToneMapping) -> Settled {
+    pub(crate) fn settle(&self, tone: &ToneMapping) -> Settled {
         let (grid, halves) = (self.grid, self.has_halves());
         // Found once for each column and row
         let columns: Vec<usize> = (0..grid.width()).map(|x| grid.index_at(x, 0)).collect();

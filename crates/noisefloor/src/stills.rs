@@ -325,7 +325,7 @@ impl<'a> SnapshotPair<'a> {
             _ if evidence != Evidence::Halves => (Samples::Independent, others.to_vec()),
             Some(samples) => (samples, others.to_vec()),
             None if image.display_referred => recognise(image, others, &Display::SRGB)?,
-            None => recognise(image, others, &tone.settle_noisy(image.size.0, &image.pixels).display)?,
+            None => recognise(image, others, &settle_noisy(&tone, image))?,
         };
         if evidence == Evidence::Halves && samples == Samples::Independent {
             check_apart(&others)?;
@@ -546,6 +546,13 @@ fn settle(tone: &ToneMapping, image: &Still, other: &Still, samples: Samples) ->
             }
         }
     };
+    tone.settle_by(|| exposure::estimate(image.size, pixel)).display
+}
+
+/// The same from one of them alone: what differs among 2×2 pixels counts as noise.
+fn settle_noisy(tone: &ToneMapping, image: &Still) -> Display {
+    let luminance = |x: usize, y: usize| luminance(image.pixels[y * image.size.0 + x]);
+    let pixel = |x, y| Some(NoisyPixel { luminance: luminance(x, y), deviation: None });
     tone.settle_by(|| exposure::estimate(image.size, pixel)).display
 }
 

@@ -486,8 +486,6 @@ impl PicturePair {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
-    /// One picture with this setting would be as good as the mean of the two, if noise follows the setting.
-    setting: f64,
     /// What each of the two was rendered with.
     each: f64,
     excess: Excess,
@@ -502,11 +500,8 @@ impl Step {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Next {
-    /// As [`Look`] has them.
-    Render {
-        each: f64,
-        setting: f64,
-    },
+    /// Two pictures, each with this setting.
+    Render(f64),
     Done(Ending),
 }
 
@@ -578,7 +573,7 @@ impl Tuning {
 
     /// The setting to try, or how it ended. The same until [`Tuning::tell`].
     fn next(&self) -> Next {
-        let Some(last) = self.steps.last() else { return self.render(self.knob.coarsest()) };
+        let Some(last) = self.steps.last() else { return Next::Render(self.knob.coarsest()) };
         if let Some(setting) = self.passed() {
             return Next::Done(Ending::Found { setting, too_coarse: self.too_coarse(setting) });
         }
@@ -601,13 +596,13 @@ impl Tuning {
         }
         let next = self.knob.each(self.knob.effort(last.each) + self.times_from(last).ln());
         // Rounding must not stand still
-        self.render(if next == last.each { self.knob.finest() } else { next })
+        Next::Render(if next == last.each { self.knob.finest() } else { next })
     }
 
     /// What was found with the setting that [`Tuning::next`] named; without one, nothing happens. A ratio that is not a number or
     /// negative counts as infinite.
     fn tell(&mut self, excess: Excess) {
-        if let Next::Render { each, .. } = self.next() {
+        if let Next::Render(each) = self.next() {
             self.push(each, excess);
         }
     }
@@ -623,11 +618,7 @@ impl Tuning {
         if self.steps.last().is_some_and(|before| excess.ratio > NEWLY_MET * before.excess.ratio) {
             self.since = self.steps.len();
         }
-        self.steps.push(Step { setting: self.knob.of_both(each), each, excess });
-    }
-
-    fn render(&self, each: f64) -> Next {
-        Next::Render { each, setting: self.knob.of_both(each) }
+        self.steps.push(Step { each, excess });
     }
 
     fn is_samples(&self) -> bool {
@@ -669,7 +660,7 @@ impl Tuning {
     /// The finest setting of one picture that was tried and is coarser than this one.
     fn too_coarse(&self, enough: f64) -> Option<f64> {
         let tried = self.steps.iter().filter(|step| self.enough(step.each, &step.excess).is_none());
-        let single = |step: &Step| if self.is_samples() { step.setting } else { step.each };
+        let single = |step: &Step| if self.is_samples() { self.knob.of_both(step.each) } else { step.each };
         let coarser = |setting: &f64| if self.is_samples() { *setting < enough } else { *setting > enough };
         let all = tried.map(single).filter(coarser);
         if self.is_samples() { all.reduce(f64::max) } else { all.reduce(f64::min) }
@@ -724,7 +715,7 @@ mod tests {
     fn finish(tuning: &mut Tuning, excess: impl Fn(f64) -> Excess) -> Ending {
         for _ in 0..20 {
             match tuning.next() {
-                Next::Render { each, .. } => tuning.tell(excess(each)),
+                Next::Render(each) => tuning.tell(excess(each)),
                 Next::Done(ending) => return ending,
             }
         }
@@ -788,7 +779,10 @@ mod tests {
             // Where samples follow, the mean of two is believed, and half of the samples are enough
             let (ending, steps) = search(THRESHOLD, |setting| followed(setting / needed));
             let Ending::Found { setting, .. } = ending else { panic!("{ending:?}") };
-            assert!(steps.len() == 2 && (steps[1].setting / (0.9 * needed) - 1.0).abs() < 0.01, "{steps:?}");
+            assert!(
+                steps.len() == 2 && (THRESHOLD.of_both(steps[1].each) / (0.9 * needed) - 1.0).abs() < 0.01,
+                "{steps:?}"
+            );
             assert!(setting <= needed && setting > 0.98 * needed, "{setting}");
         }
         let (ending, steps) = search(SAMPLES, |n| Excess::new((100.0 / n).sqrt()));
@@ -850,10 +844,14 @@ mod tests {
                 let knob = Knob::Samples { least, most };
                 let (ending, steps) = search(knob, |n| Excess::new((enough / n).sqrt()));
                 let in_range = |n: f64| n >= least as f64 && n <= most as f64 && n % 2.0 == 0.0;
-                assert!(steps.iter().all(|step| in_range(step.setting) && step.setting == 2.0 * step.each));
+                assert!(
+                    steps
+                        .iter()
+                        .all(|step| in_range(2.0 * step.each) && knob.of_both(step.each) == 2.0 * step.each)
+                );
                 match ending {
                     Ending::Found { setting, .. } => {
-                        assert!(setting >= enough && setting == steps[steps.len() - 1].setting)
+                        assert!(setting >= enough && setting == 2.0 * steps[steps.len() - 1].each)
                     }
                     ending => {
                         assert!(matches!(ending, Ending::AtFinest { .. }) && enough > most as f64 - 1.0)
@@ -980,10 +978,10 @@ mod tests {
     fn light_that_is_newly_met_begins_the_search_anew() {
         let mut tuning = Tuning::new(Knob::Threshold { coarsest: 0.2, finest: 1e-5 }).unwrap();
         for ratio in [2.13, 1.48, 2.31, 3.22] {
-            assert!(matches!(tuning.next(), Next::Render { .. }), "{tuning:?}");
+            assert!(matches!(tuning.next(), Next::Render(_)), "{tuning:?}");
             tuning.tell(followed(ratio));
         }
-        let Next::Render { each: met, .. } = tuning.next() else { panic!("{tuning:?}") };
+        let Next::Render(met) = tuning.next() else { panic!("{tuning:?}") };
         let law = |each: f64| 2.0 * each / met;
         let ending = finish(&mut tuning, |each| followed(law(each)));
         let Ending::Found { setting, .. } = ending else { panic!("{ending:?}") };
@@ -1012,7 +1010,7 @@ mod tests {
         let Next::Done(Ending::Found { setting, .. }) = tuning.next() else { panic!() };
         // The whole, of which that was a part, is not enough by a little
         tuning.reopen(THRESHOLD.of_each(setting), Excess::new(1.05));
-        let Next::Render { each, .. } = tuning.next() else { panic!("{:?}", tuning.next()) };
+        let Next::Render(each) = tuning.next() else { panic!("{:?}", tuning.next()) };
         assert!(each < setting && each > 0.5 * setting, "{each} after {setting}");
         tuning.tell(Excess::new(0.65));
         assert_eq!(

@@ -5,10 +5,14 @@ fn still(value: impl Fn(usize) -> f32) -> Still {
     Still { size: (32, 32), pixels, spp: 16.0, display_referred: true, rounding: 0.0, origin: None }
 }
 
+/// Two pictures that share no samples.
+fn pair<'a>(image: &'a Still, other: &'a Still) -> SnapshotPair<'a> {
+    let (tone, samples) = (ToneMapping::default(), Some(Samples::Independent));
+    SnapshotPair::new(Evidence::Halves, image, &[other], tone, samples).unwrap()
+}
+
 fn unlike(a: &Still, b: &Still) -> usize {
-    let tone = ToneMapping::default();
-    let pair = SnapshotPair::new(Evidence::Halves, a, &[b], tone, Some(Samples::Independent)).unwrap();
-    pair.unlike_tiles(TileGrid::new(32, 32, 16).unwrap()).into_iter().filter(|unlike| *unlike).count()
+    pair(a, b).unlike_tiles(TileGrid::new(32, 32, 16).unwrap()).into_iter().filter(|unlike| *unlike).count()
 }
 
 #[test]
@@ -44,9 +48,7 @@ fn another_brightness_is_noticed_beside_a_lamp() {
             Still::new((128, 128), (0..128 * 128).map(|i| [light(i); 3]).collect(), spp)
         };
         let (one, other) = (picture(0, 1.0, one), picture(1, bright, other));
-        let samples = Some(Samples::Independent);
-        let pair = SnapshotPair::new(Evidence::Halves, &one, &[&other], ToneMapping::default(), samples);
-        pair.unwrap().warnings()
+        pair(&one, &other).warnings()
     };
     for seed in 0..8 {
         let said = warnings(seed, 0.92, [256.0; 2]);
@@ -113,9 +115,7 @@ fn finished_pictures_lack_light_that_one_alone_has_met() {
         Still::new((EDGE, EDGE), pixels, 512.0)
     };
     let unmet = |a: &Still, b: &Still| {
-        let (tone, how) = (ToneMapping::default(), Some(Samples::Independent));
-        let pair = SnapshotPair::new(Evidence::Halves, a, &[b], tone, how).unwrap();
-        let judged = pair.judge(&Oracle::bundled(), grid, Audience::TRAINED).unwrap();
+        let judged = pair(a, b).judge(&Oracle::bundled(), grid, Audience::TRAINED).unwrap();
         // The windows of tiles 1, 4 and 5 have it in sight
         let beyond = [2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15].map(|tile| judged.verdicts()[tile]);
         assert!(beyond.iter().all(|verdict| verdict.open_for.is_some() != verdict.converged), "{beyond:?}");
@@ -147,14 +147,7 @@ fn values_of_large_pictures_are_looked_at_together() {
         let [mut a, b] = [1, 2].map(of_a_byte);
         a[SIDE * SIDE - 1] = [last; 3];
         let [a, b] = [a, b].map(|pixels| Still::new((SIDE, SIDE), pixels, 64.0));
-        let pair = SnapshotPair::new(
-            Evidence::Halves,
-            &a,
-            &[&b],
-            ToneMapping::default(),
-            Some(Samples::Independent),
-        );
-        let warnings = pair.unwrap().notice(TileGrid::new(SIDE, SIDE, 64).unwrap()).unwrap().warnings;
+        let warnings = pair(&a, &b).notice(TileGrid::new(SIDE, SIDE, 64).unwrap()).unwrap().warnings;
         warnings.contains(&StillWarning::Quantised(Encoding::Linear))
     };
     assert!(noticed(50.0 / 255.0) && !noticed(50.4 / 255.0));

@@ -1,6 +1,6 @@
 //! A search over several pictures, or over parts of large ones.
 
-use super::{Ending, Excess, Knob, KnobError, Next, Tuning};
+use super::{Ending, Excess, Knob, KnobError, Next, Step, Tuning};
 use crate::tile::Tile;
 
 /// Edge of crops, in pixels: a square that is judged, and half of one around it.
@@ -53,7 +53,7 @@ pub fn drive<E>(
     }
     match search.tuning.next() {
         Next::Done(ending) => Ok(ending),
-        Next::Render { .. } => unreachable!("a search that asks for nothing has ended"),
+        Next::Render(_) => unreachable!("a search that asks for nothing has ended"),
     }
 }
 
@@ -150,7 +150,8 @@ impl Search {
     /// Takes over a step of an earlier search: its setting, and what was found. Returns whether this search would have tried the
     /// same, and has taken it; with another range, it may go another way from some step on.
     pub fn repeat(&mut self, setting: f64, excess: Excess) -> bool {
-        let tries_it = matches!(self.tuning.next(), Next::Render { setting: tried, .. } if tried == setting);
+        let tries_it =
+            matches!(self.tuning.next(), Next::Render(each) if self.knob().of_both(each) == setting);
         if tries_it {
             self.tuning.tell(excess);
             self.purpose = Purpose::Step;
@@ -165,7 +166,7 @@ impl Search {
 
     /// What was tried, in order: each [`Look::setting`], with what was found in the worst place.
     pub fn steps(&self) -> impl DoubleEndedIterator<Item = (f64, Excess)> {
-        self.tuning.steps.iter().map(|step| (step.setting, step.excess))
+        self.tuning.steps.iter().map(move |step| (self.knob().of_both(step.each), step.excess))
     }
 
     /// How it ended; `None` before that.
@@ -193,8 +194,9 @@ impl Search {
             (Purpose::Again, Next::Done(Ending::Found { setting, .. }), _) => {
                 (self.knob().of_each(setting), setting)
             }
-            (Purpose::Closer { .. }, _, Some(last)) => (last.each, last.setting),
-            (_, Next::Render { each, setting }, _) => (each, setting),
+            (Purpose::Closer { .. }, _, Some(&Step { each, .. })) | (_, Next::Render(each), _) => {
+                (each, self.knob().of_both(each))
+            }
             (_, Next::Done(_), _) => return None,
         };
         let Place { view, crop } = *self.places.get(self.seen.len())?;
@@ -235,7 +237,7 @@ impl Search {
                 let crops = self.choose(&seen);
                 let mut whole = self.tuning.clone();
                 whole.tell(excess);
-                if !crops.is_empty() && matches!(whole.next(), Next::Render { .. }) {
+                if !crops.is_empty() && matches!(whole.next(), Next::Render(_)) {
                     (self.places, self.purpose) = (crops, Purpose::Closer { worst: excess.ratio });
                     return false;
                 }
@@ -266,7 +268,7 @@ impl Search {
                 self.tuning.reopen(look.each, excess);
                 let crops = self.choose(&seen);
                 self.go_on(&seen);
-                if matches!(self.tuning.next(), Next::Render { .. }) && !crops.is_empty() {
+                if matches!(self.tuning.next(), Next::Render(_)) && !crops.is_empty() {
                     (self.places, self.purpose) = (crops, Purpose::Closer { worst: excess.ratio });
                     return false;
                 }
