@@ -35,6 +35,10 @@ fn a_process_that_fails_again_and_again_is_an_error() {
         ("give too many", "4 samples where 1 were requested"),
         ("stop much too late", "100001 samples where 1 were requested"),
     ];
+    // Here, since threads do not know whose they are
+    if Fake::new(wrong[0].0).is_none() {
+        return;
+    }
     let is_wrong = |how: &str, words: &str| {
         let Some(fake) = Fake::new(how) else { return };
         let (error, source) = failure(&fake);
