@@ -163,15 +163,20 @@ pub(crate) struct Settled {
 }
 
 /// exp(mean ln(δ + L)), Reinhard et al. 2002, eq. 1 with the 1/N inside the exponential as their text has
-/// it, over the pixels that are not black: a model on black would else be shown the brighter the smaller
-/// it is, until it burns out. `None` if there is none.
+/// it, over the pixels that are not black or next to black ([`exposure::counted`]): a model on black would else be shown the
+/// brighter the smaller it is, until it burns out. `None` if there is none.
 fn log_average(pixels: &[Rgb]) -> Option<f64> {
     let lit = || pixels.iter().map(|&p| f64::from(luminance(p))).filter(|&l| l > 0.0 && l.is_finite());
+    let (roots, count) = lit().fold((0.0, 0.0), |(sum, n), l| (sum + l.sqrt(), n + 1.0));
+    let faintest = exposure::faintest(roots / count);
     let geometric_mean = |delta: f64| {
-        let (sum, count) = lit().fold((0.0, 0u64), |(sum, n), l| (sum + (delta + l).ln(), n + 1));
-        (count > 0).then(|| (sum / count as f64).exp())
+        let (sum, count) = lit().fold((0.0, 0.0), |(sum, n), l| {
+            let weight = exposure::counted(l.ln(), faintest);
+            (sum + weight * (delta + l).ln(), n + weight)
+        });
+        (sum / count).exp()
     };
-    geometric_mean(DELTA * geometric_mean(0.0)?)
+    (count > 0.0).then(|| geometric_mean(DELTA * geometric_mean(0.0)))
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -20,6 +20,11 @@ pub(crate) use block::{NoisyBlock, PIXELS};
 /// geometric mean withstands fireflies.
 pub(super) const DELTA: f64 = 1e-4;
 
+/// Less than this share of a picture's light, which is its mean of square roots, squared, counts as none, as black does: the
+/// highlight of a smooth metal falls off by thirty decades, and most of its geometric mean would be of light that no
+/// screen shows. Fireflies hardly lift a mean of roots.
+const FAINT: f64 = 1e-4;
+
 /// Squared ratio of a mean to its standard error from which it is known. With a larger one, blocks are
 /// larger, and what the picture changes by within them counts as too bright; with a smaller one, pixels
 /// are sorted by their noise, and count as too dark. Of 6 to 48, 6 to 9 did best.
@@ -53,6 +58,17 @@ const SAMPLED: f64 = 0.0075;
 
 /// Where blocks of four grids begin: what a block has of both sides of an edge is then not left to chance.
 const GRIDS: [(usize, usize); 4] = [(0, 0), (21, 9), (42, 51), (11, 33)];
+
+/// Logarithm of the least light that counts beside light with this mean of square roots.
+pub(super) fn faintest(mean_root: f64) -> f64 {
+    (FAINT * mean_root * mean_root).ln()
+}
+
+/// How much light of this logarithm counts: fully from e times the least on, so that no step bends a picture whose light falls
+/// off through all decades.
+pub(super) fn counted(log: f64, faintest: f64) -> f64 {
+    (log - faintest).clamp(0.0, 1.0)
+}
 
 /// What is known of one pixel.
 #[derive(Clone, Copy, Debug)]
@@ -177,28 +193,26 @@ const BINS: i32 = 256;
 struct Tally {
     /// [`ENOUGH`], or another.
     enough: f64,
-    /// Pixels, and the sum of their logarithms.
-    bins: Vec<[f64; 2]>,
-    /// Squared standard error of the sum of all logarithms.
-    variance: f64,
+    /// Pixels, the sum of their logarithms, and its squared standard error.
+    bins: Vec<[f64; 3]>,
 }
 
 impl Tally {
     fn new(enough: f64) -> Self {
-        Self { enough, bins: vec![[0.0; 2]; BINS as usize], variance: 0.0 }
+        Self { enough, bins: vec![[0.0; 3]; BINS as usize] }
     }
 
     fn add(&mut self, pixels: f64, log: f64, relative: f64) {
-        let [count, sum] = &mut self.bins[Self::bin(log)];
+        let [count, sum, variance] = &mut self.bins[Self::bin(log)];
         *count += pixels;
         *sum += pixels * log;
-        self.variance += pixels * pixels * relative;
+        *variance += pixels * pixels * relative;
     }
 
     /// The same of single pixels, those that are known.
     fn add_pixels(&mut self, known: &[bool; PIXELS], logs: &[f64; PIXELS], relative: &[f64; PIXELS]) {
         // Neighbours are mostly of one bin, which need not be written each time
-        let (mut bin, mut variance) = (0, self.variance);
+        let mut bin = 0;
         let mut here = self.bins[bin];
         for ((&log, relative), _) in logs.iter().zip(relative).zip(known).filter(|(_, known)| **known) {
             let next = Self::bin(log);
@@ -206,11 +220,9 @@ impl Tally {
                 self.bins[bin] = here;
                 (bin, here) = (next, self.bins[next]);
             }
-            here = [here[0] + 1.0, here[1] + log];
-            variance += relative;
+            here = [here[0] + 1.0, here[1] + log, here[2] + relative];
         }
         self.bins[bin] = here;
-        self.variance = variance;
     }
 
     fn bin(log: f64) -> usize {
@@ -220,22 +232,34 @@ impl Tally {
     }
 
     fn merge(&mut self, other: &Self) {
-        for (bin, [count, sum]) in self.bins.iter_mut().zip(&other.bins) {
-            bin[0] += count;
-            bin[1] += sum;
+        for (bin, other) in self.bins.iter_mut().zip(&other.bins) {
+            bin.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
         }
-        self.variance += other.variance;
     }
 
-    fn pixels(&self) -> f64 {
-        self.bins.iter().map(|bin| bin[0]).sum()
+    /// Over all bins, of pixels, the sum of their logarithms, or its squared standard error.
+    fn sum(&self, of: usize) -> f64 {
+        self.bins.iter().map(|bin| bin[of]).sum()
+    }
+
+    /// Takes out what counts as black beside the rest; the logarithm of the least light that does not. Within a bin, all are
+    /// alike.
+    fn drop_faint(&mut self) -> f64 {
+        let root =
+            |&[count, sum, _]: &[f64; 3]| if count > 0.0 { count * (0.5 * sum / count).exp() } else { 0.0 };
+        let faintest = faintest(self.bins.iter().map(root).sum::<f64>() / self.sum(0));
+        for bin in self.bins.iter_mut().filter(|bin| bin[0] > 0.0) {
+            let weight = counted(bin[1] / bin[0], faintest);
+            *bin = [weight * bin[0], weight * bin[1], weight * weight * bin[2]];
+        }
+        faintest
     }
 
     /// exp(mean ln(δ + L)): see [`super::log_average`]. Within a bin, all are alike to δ.
     fn log_average(&self) -> f64 {
-        let pixels = self.pixels();
-        let mean = self.bins.iter().map(|bin| bin[1]).sum::<f64>() / pixels;
-        let lifted = |&[count, sum]: &[f64; 2]| {
+        let pixels = self.sum(0);
+        let mean = self.sum(1) / pixels;
+        let lifted = |&[count, sum, _]: &[f64; 3]| {
             if count > 0.0 { sum + count * (DELTA * (mean - sum / count).exp()).ln_1p() } else { 0.0 }
         };
         (self.bins.iter().map(lifted).sum::<f64>() / pixels).exp()
@@ -385,12 +409,14 @@ fn over_all(
         (across, down) = (across.div_ceil(2), down.div_ceil(2));
     }
     let rest = pools.first().copied().unwrap_or_default();
-    let known = tally.pixels();
-    if known == 0.0 {
-        let value = rest.sum / rest.lit;
-        return (value > 0.0).then_some(LogAverage { value, error: UNKNOWN });
+    let rest_mean = rest.sum / rest.lit;
+    if tally.sum(0) == 0.0 {
+        return (rest_mean > 0.0).then_some(LogAverage { value: rest_mean, error: UNKNOWN });
     }
-    let error = (tally.variance.sqrt() / known).hypot(UNKNOWN * rest.lit / (rest.lit + known));
+    let faintest = tally.drop_faint();
+    let known = tally.sum(0);
+    let unknown = if rest_mean > 0.0 { rest.lit * counted(rest_mean.ln(), faintest) } else { rest.lit };
+    let error = (tally.sum(2).sqrt() / known).hypot(UNKNOWN * unknown / (unknown + known));
     Some(LogAverage { value: tally.log_average(), error })
 }
 

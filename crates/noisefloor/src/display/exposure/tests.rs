@@ -143,6 +143,26 @@ fn black_is_left_out_and_unmet_light_is_not() {
     assert_eq!(estimate(SIZE, |_, _| None), None);
 }
 
+/// A surface beside one that falls off through 26 decades, as a smooth metal does: by itself it is known, and so is the
+/// picture, within as much as the last decade that counts.
+#[test]
+fn what_no_screen_shows_counts_as_black() {
+    let bright = |x: usize| x < SIZE.0 / 2;
+    let truth =
+        picture(|x, y| if bright(x) { 1.0 } else { 10f64.powf(-0.4 * (x - 64) as f64 - 0.005 * y as f64) });
+    let lit = log_average(&rgb(&truth)).unwrap();
+    // By NumPy; of all decades, the geometric mean would be 4·10⁻⁷
+    assert!((lit / 0.487_783_1 - 1.0).abs() < 1e-4, "{lit}");
+    for (seed, share) in [1.0, 0.5, 0.2].into_iter().enumerate() {
+        let found = of_pair(&met(&truth, |_| share, 70 + seed as u64));
+        assert_sound(found, &truth, share);
+        assert!(found.error < 0.1, "{share}: {found:?}");
+    }
+    // The unit of light does not matter
+    let scaled: Vec<f64> = truth.iter().map(|light| light * 1e9).collect();
+    assert!((log_average(&rgb(&scaled)).unwrap() / lit / 1e9 - 1.0).abs() < 1e-3);
+}
+
 #[test]
 fn it_says_how_well_it_is_known() {
     let truth = waves();
