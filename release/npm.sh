@@ -1,12 +1,11 @@
 #!/usr/bin/env bash
-# Makes the package for npm from the work tree: release/npm.sh FOLDER [--debian]. The second word goes to
-# build.sh of crates/noisefloor-capi/js. The package is installed into an empty folder at last, and judges a
-# tile there; and into the newest template of Vite, in which TypeScript compiles the README's snippet by strict options, and
+# Makes the package for npm from the work tree: release/npm.sh FOLDER. The package is installed into an empty folder at last,
+# and judges a tile there; and into the newest template of Vite, in which TypeScript compiles the README's snippet by strict options, and
 # Chromium shows the package in pages.
 set -euo pipefail
 folder=$(mkdir -p "$1" && cd "$1" && pwd)
 js=$(cd "$(dirname "$0")/../crates/noisefloor-capi/js" && pwd)
-"$js/build.sh" "${@:2}"
+"$js/build.sh"
 
 empty=$(mktemp -d)
 trap 'rm -rf "$empty"' EXIT
