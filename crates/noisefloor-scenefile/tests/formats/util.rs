@@ -115,6 +115,9 @@ pub(crate) fn close(got: Rgb, want: Rgb, tolerance: f32, what: &str) {
 
 // Elements of Mitsuba's scenes.
 
+/// White all around.
+pub(crate) const SKY: &str = r#"<emitter type="constant"/>"#;
+
 /// A parameter.
 pub(crate) fn value(tag: &str, name: &str, value: impl Display) -> String {
     format!("<{tag} name=\"{name}\" value=\"{value}\"/>")
@@ -135,6 +138,14 @@ pub(crate) fn of(tag: &str, kind: &str, inside: &str) -> String {
 
 pub(crate) fn bsdf(kind: &str, inside: &str) -> String {
     of("bsdf", kind, inside)
+}
+
+/// A picture whose pixels are seen one by one.
+pub(crate) fn nearest(name: &str, file: &str, raw: bool) -> String {
+    format!(
+        r#"<texture type="bitmap" name="{name}"><string name="filename" value="{file}"/>
+            <string name="filter_type" value="nearest"/><boolean name="raw" value="{raw}"/></texture>"#
+    )
 }
 
 pub(crate) fn to_world(steps: &str) -> String {

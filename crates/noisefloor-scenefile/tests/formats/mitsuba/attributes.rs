@@ -1,4 +1,4 @@
-use crate::util::{Folder, bsdf, close, rgb, value};
+use crate::util::{Folder, SKY, bsdf, close, rgb, value};
 
 /// Two triangles side by side with a colour at their corners, and a weight on each.
 fn folder() -> Folder {
@@ -15,8 +15,6 @@ fn folder() -> Folder {
     );
     Folder::new().with("mesh.ply", text).with("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
 }
-
-const SKY: &str = r#"<emitter type="constant"/>"#;
 
 fn mesh(bsdf: &str) -> String {
     format!(

@@ -1,4 +1,4 @@
-use crate::util::{Folder, close, of, rgb, seen, to_world};
+use crate::util::{Folder, SKY, close, nearest, of, rgb, seen, to_world};
 use std::f32::consts::FRAC_1_PI;
 
 const FLOOR: &str = r#"<shape type="rectangle"><transform name="to_world"><scale value="100"/></transform>
@@ -32,17 +32,9 @@ fn lights_without_size_light_a_floor() {
 fn pictures_are_projected_as_in_mitsuba() {
     let pixels = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 255]];
     let folder = Folder::new().with_png("four.png", 2, &pixels);
-    let at = |x: f32, y: f32| {
-        format!(
-            r#"<transform name="to_world"><lookat origin="{x},{y},2" target="{x},{y},0" up="0,1,0"/></transform>"#
-        )
-    };
-    let picture = |name: &str| {
-        format!(
-            r#"<texture type="bitmap" name="{name}"><string name="filename" value="four.png"/>
-                <string name="filter_type" value="nearest"/></texture>"#
-        )
-    };
+    let at =
+        |x: f32, y: f32| to_world(&format!(r#"<lookat origin="{x},{y},2" target="{x},{y},0" up="0,1,0"/>"#));
+    let picture = |name: &str| nearest(name, "four.png", false);
     let aslant =
         r#"<transform name="to_world"><lookat origin="0,0,2" target="0.630598,0,0" up="0,1,0"/></transform>"#;
     let projector = |x: f32, y: f32, light: &str| {
@@ -172,10 +164,9 @@ fn lamps_of_nothing_shine() {
             <emitter type="area"><rgb name="radiance" value="0.5 0.25 0"/></emitter></shape>"#
         )
     };
-    let sky = r#"<emitter type="constant"/>"#;
-    let front = lamp("") + sky;
+    let front = lamp("") + SKY;
     close(folder.see(&front), [1.5, 1.25, 1.0], 1e-4, &front);
-    let back = lamp(r#"<boolean name="flip_normals" value="true"/>"#) + sky;
+    let back = lamp(r#"<boolean name="flip_normals" value="true"/>"#) + SKY;
     close(folder.see(&back), [1.0; 3], 1e-4, &back);
 
     // A floor lit by a small lamp, and by the sky through it: ρ/π·(A·L/h² + π) where it looks straight up
@@ -183,7 +174,7 @@ fn lamps_of_nothing_shine() {
         <rotate y="1" angle="180"/><translate z="2"/></transform>"#;
     let floor = r#"<shape type="rectangle"><transform name="to_world"><scale value="9"/></transform>
         <bsdf type="diffuse"><float name="reflectance" value="0.5"/></bsdf></shape>"#;
-    let small = lamp(up).replace("0.5 0.25 0", "500 250 0") + floor + sky;
+    let small = lamp(up).replace("0.5 0.25 0", "500 250 0") + floor + SKY;
     let light = |radiance: f32| 0.5 / std::f32::consts::PI * 0.01 / 4.0 * radiance + 0.5;
     // One lobe and one sky: 4096 samples have a standard error of 1 %
     close(folder.see(&small), [light(500.0), light(250.0), light(0.0)], 0.04, &small);

@@ -1,6 +1,4 @@
-use crate::util::{Folder, bsdf, close, float, of, ply, rgb, shape_at, value};
-
-const SKY: &str = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>"#;
+use crate::util::{Folder, SKY, bsdf, close, float, nearest, of, ply, rgb, shape_at, value};
 
 /// A 2 × 2 picture: red, green; grey, white; all transparent but one.
 pub(crate) fn folder() -> Folder {
@@ -215,11 +213,10 @@ fn surfaces_reflect_a_white_sky_as_they_should() {
 #[test]
 fn principled_surfaces_vary() {
     let folder = folder().with_png("rough.png", 2, &[[25, 25, 25, 255]; 4]);
-    let rough = r#"<texture name="roughness" type="bitmap"><string name="filename" value="rough.png"/>
-        <boolean name="raw" value="true"/><string name="filter_type" value="nearest"/></texture>"#;
+    let rough = nearest("roughness", "rough.png", true);
     let metal = format!(r#"<texture name="metallic" {BITMAP}</texture>"#);
     for (roughness, warnings) in [
-        (rough, 0),
+        (rough.as_str(), 0),
         (r#"<float name="roughness" value="0.1"/>"#, 0),
         (&rough.replace("nearest", "bilinear"), 1),
     ] {

@@ -1,17 +1,10 @@
-use crate::util::{Folder, bsdf, float, shape_at, value};
-
-const SKY: &str = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>"#;
+use crate::util::{Folder, SKY, bsdf, float, nearest, shape_at, value};
 
 /// α by a picture and by direction: what each place of a mirror shows is that of one with its own α.
 #[test]
 fn roughness_may_be_a_picture_and_differ_by_direction() {
     let folder = Folder::new().with_png("a.png", 2, &[[26, 26, 26, 255], [128, 128, 128, 255]]);
-    let map = |name: &str| {
-        format!(
-            r#"<texture name="{name}" type="bitmap"><string name="filename" value="a.png"/>
-            <boolean name="raw" value="true"/><string name="filter_type" value="nearest"/></texture>"#
-        )
-    };
+    let map = |name: &str| nearest(name, "a.png", true);
     let sun = r#"<emitter type="directional"><vector name="direction" x="-0.3" y="0.1" z="-1"/></emitter>"#;
     let at = |x: f32, alphas: &str| {
         let metal = bsdf("roughconductor", &(value("string", "distribution", "ggx") + alphas));

@@ -1,4 +1,4 @@
-use crate::util::{CAMERA, Folder, close, seen};
+use crate::util::{CAMERA, Folder, SKY, close, seen};
 use noisefloor_ptwne::FovAxis;
 
 fn sensor(version: &str, inside: &str) -> Result<noisefloor_scenefile::Loaded, String> {
@@ -125,7 +125,6 @@ fn hidden_emitters_are_not_seen() {
     let hidden = r#"<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>"#;
     let lamp = r#"<shape type="rectangle"><transform name="to_world"><scale value=".3"/></transform>
         <emitter type="area"><rgb name="radiance" value="4"/></emitter></shape>"#;
-    let sky = r#"<emitter type="constant"/>"#;
     let behind = |bsdf: &str| {
         format!(
             r#"<shape type="rectangle"><transform name="to_world"><scale value="50"/><translate z="-1"/></transform>
@@ -138,10 +137,10 @@ fn hidden_emitters_are_not_seen() {
         <bsdf type="thindielectric"><float name="int_ior" value="1.5"/></bsdf></shape>"#;
     for (body, seen, unseen) in [
         (lamp.to_owned(), 4.0, 0.0),
-        (sky.to_owned(), 1.0, 0.0),
-        (format!("{mirror}{sky}"), 1.0, 1.0),
+        (SKY.to_owned(), 1.0, 0.0),
+        (format!("{mirror}{SKY}"), 1.0, 1.0),
         // A pane reflects 2·0.04/1.04 of the sky, and shows the lamp behind it
-        (format!("{pane}{lamp}{sky}"), 4.0 - 3.0 * 0.076923, 4.0 - 3.0 * 0.076923),
+        (format!("{pane}{lamp}{SKY}"), 4.0 - 3.0 * 0.076923, 4.0 - 3.0 * 0.076923),
     ] {
         close(folder.see(&body), [seen; 3], 2e-2, &body);
         close(folder.see(&format!("{hidden}{body}")), [unseen; 3], 2e-2, &body);
@@ -152,8 +151,8 @@ fn hidden_emitters_are_not_seen() {
         close(folder.see(&format!("{nested}{body}")), [unseen; 3], 2e-2, &body);
     }
     // The lamp lights the wall behind it only from its back, where it does not shine; the sky around does
-    let before = format!("{wall}{lamp}{sky}");
-    let without = folder.see(&format!("{wall}{sky}"))[0];
+    let before = format!("{wall}{lamp}{SKY}");
+    let without = folder.see(&format!("{wall}{SKY}"))[0];
     let seen = folder.see(&format!("{hidden}{before}"))[0];
     assert!(seen < without && seen > 0.8 * without, "{seen} beside {without}");
 }

@@ -1,4 +1,4 @@
-use crate::util::{CAMERA, Folder, close, ply, seen, shape_at};
+use crate::util::{CAMERA, Folder, SKY, close, nearest, ply, seen, shape_at};
 
 const LIGHT: &str = r#"<emitter type="area"><rgb name="radiance" value="1, 2, 3"/></emitter>"#;
 
@@ -127,7 +127,7 @@ fn spheres_inside_out_are_glass_of_the_reciprocal_index() {
             r#"<shape type="sphere">{flip}<transform name="to_world"><translate x="0.8"/></transform>
                 <bsdf type="dielectric"><float name="int_ior" value="1.5"/>
                 <float name="ext_ior" value="1"/><float name="specular_transmittance" value="0"/></bsdf>
-                </shape><emitter type="constant"/>"#
+                </shape>{SKY}"#
         ))
     };
     close(reflected(flip), [1.0; 3], 1e-3, "bubble");
@@ -211,11 +211,10 @@ fn instances_share_their_group() {
     let instance = r#"<shape type="instance"><ref id="g"/><transform name="to_world">
         <scale x="-2" y="0.5" z="1"/></transform></shape>"#;
     let folder = Folder::new();
-    let sky = r#"<emitter type="constant"/>"#;
     let scene = folder.body(&format!("{group}{}", instance.repeat(4000))).unwrap().scene;
     assert_eq!((scene.surfaces(), scene.instances()), (1, 4000));
     // Grey in a white sky, black from inside
-    close(folder.see(&format!("{sky}{group}{instance}")), [0.5; 3], 0.02, "mirrored");
+    close(folder.see(&format!("{SKY}{group}{instance}")), [0.5; 3], 0.02, "mirrored");
 
     let flat = instance.replace("0.5", "0");
     let loaded = folder.body(&format!("{group}{instance}{flat}{flat}")).unwrap();
@@ -241,9 +240,8 @@ fn meshes_without_coordinates_are_mapped_by_their_corners() {
         let seen = folder.see(&format!(
             r#"<shape type="ply"><string name="filename" value="a.ply"/>
             <transform name="to_world"><translate x="-{x}" y="-{y}"/></transform>
-            <emitter type="area"><texture type="bitmap" name="radiance">
-            <string name="filename" value="a.png"/><boolean name="raw" value="true"/>
-            <string name="filter_type" value="nearest"/></texture></emitter></shape>"#
+            <emitter type="area">{}</emitter></shape>"#,
+            nearest("radiance", "a.png", true)
         ));
         close(seen, [want[0], want[1], 0.0], 1e-3, &format!("{x} {y}"));
     }
@@ -304,7 +302,7 @@ fn concave_polygons_cover_what_they_enclose() {
     );
     for kind in ["obj", "ply"] {
         let scene = format!(
-            r#"<scene version="3.0.0">{sensor}<emitter type="constant"><rgb name="radiance" value="1"/></emitter>
+            r#"<scene version="3.0.0">{sensor}{SKY}
             <shape type="{kind}"><string name="filename" value="u.{kind}"/><bsdf type="twosided"><bsdf type="diffuse">
             <rgb name="reflectance" value="0"/></bsdf></bsdf></shape></scene>"#
         );
