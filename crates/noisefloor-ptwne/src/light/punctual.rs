@@ -13,8 +13,6 @@ pub enum Profile {
     /// As 1/cos³ θ, so that a plane across the axis is lit evenly: Mitsuba's projectors.
     #[default]
     EvenPlane,
-    /// Not at all: pbrt's projectors.
-    Even,
     /// As a spot fades: half angles in degrees as in [`Punctual::Spot`], and how it fades between them.
     Spot {
         /// Half angle in degrees up to which the intensity is constant, 0…90.
@@ -88,7 +86,6 @@ fn projector(
     }
     let projection = match profile {
         Profile::EvenPlane => Projection::EvenPlane,
-        Profile::Even => Projection::Cone(Cone::EVERYWHERE),
         Profile::Spot { inner, outer, falloff } => Projection::Cone(Cone::new(inner, outer, falloff)?),
     };
     let position = position(at)?.into();

@@ -24,14 +24,14 @@ fn spots_and_projectors_keep_their_profiles() {
     let axes = [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]];
     let pixels = Pixels::Linear8([[0, 255, 0], [255, 0, 0]].into());
     let picture = Texture::Image(ImageTexture { nearest: true, ..ImageTexture::new(2, 1, pixels) });
+    let even = 5.0 / 4.0 * 0.5 / std::f64::consts::PI;
     let inner_outer = |outer| Profile::Spot { inner: 20.0, outer, falloff: Falloff::Squared };
     for (extent, profile, expected) in [
-        ([1.0, 1.0], Profile::EvenPlane, 5.0 / 4.0 * 0.5 / std::f64::consts::PI),
-        ([1.0, 1.0], Profile::Even, point),
-        ([0.51, 0.51], Profile::Even, point),
+        ([1.0, 1.0], Profile::EvenPlane, even),
+        ([0.51, 0.51], Profile::EvenPlane, even),
         ([1.0, 1.0], inner_outer(50.0), point * x * x),
-        ([1.0, 0.49], Profile::Even, 0.0),
-        ([0.49, 1.0], Profile::Even, 0.0),
+        ([1.0, 0.49], Profile::EvenPlane, 0.0),
+        ([0.49, 1.0], Profile::EvenPlane, 0.0),
         ([1.0, 1.0], inner_outer(35.0), 0.0),
     ] {
         let projector = Punctual::Projector { position, axes, extent, intensity, profile };
