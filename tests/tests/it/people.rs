@@ -3,7 +3,7 @@ use noisefloor::{
     evidence::{Samples, TilePlanes, residual_scale},
 };
 use noisefloor_image::{DisplayImage, Picture, read_picture};
-use noisefloor_learn::{Corpus, JudgedZone, ZoneImages};
+use noisefloor_learn::{Corpus, JudgedZone, ThresholdRow, ZoneImages};
 use noisefloor_testkit::require_shared;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ fn early_pictures_are_noisy_and_last_ones_are_not() {
     let for_half = Oracle::new(Model::bundled(), People::new(0.5).unwrap());
     let (mut zones, mut asked, mut early, mut late) = (0, 0, 0, 0);
     for scene in corpus.scenes() {
-        let of_scene = || corpus.zones().iter().filter(|z| z.scene == scene);
+        let of_scene = || corpus.zones().iter().filter(|z| z.row.scene == scene);
         let ZoneImages::RunningMeans(folder) = &of_scene().next().unwrap().stack else { panic!("{scene}") };
         let name = |path: PathBuf| path.file_stem()?.to_str()?.parse::<u64>().ok();
         let mut spp: Vec<u64> =
@@ -55,10 +55,13 @@ fn early_pictures_are_noisy_and_last_ones_are_not() {
         // The last picture is held against the early one with most samples: the first has too few to say much
         let most_early = *spp.iter().rfind(|&&n| 2 * n <= spp[spp.len() - 1]).unwrap();
         let [first, middle, last] = [spp[0], most_early, spp[spp.len() - 1]].map(|n| shown(folder, n));
-        let tile = |z: &JudgedZone| Tile { index: 0, x: z.x, y: z.y, width: z.width, height: z.height };
+        let tile = |z: &JudgedZone| {
+            let ThresholdRow { x, y, width, height, .. } = z.row;
+            Tile { index: 0, x, y, width, height }
+        };
         let tiles: Vec<Tile> = of_scene().map(tile).collect();
         zones += tiles.len();
-        let more: Vec<bool> = of_scene().map(|z| z.human_spp >= 2.0 * first.1).collect();
+        let more: Vec<bool> = of_scene().map(|z| z.row.human_spp >= 2.0 * first.1).collect();
         asked += more.iter().filter(|&&more| more).count();
         let in_first = converged(&oracle, &first, &last, &tiles);
         early += in_first.iter().zip(&more).filter(|&(&converged, &more)| converged && more).count();

@@ -6,7 +6,7 @@ use crate::error::LabError;
 use crate::files::{make_folder, write_text};
 use noisefloor::{Rgb, Tile, display::Display};
 use noisefloor_image::maps::{Canvas, ColourScale, TileMark, draw_tiles};
-use noisefloor_learn::{Corpus, CorpusError, Encoding, JudgedZone, Prediction, ReliabilityBin};
+use noisefloor_learn::{Corpus, CorpusError, Encoding, Prediction, ReliabilityBin, ThresholdRow};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::collections::BTreeMap;
@@ -95,7 +95,7 @@ fn pictures_of(folder: &Path) -> Result<BTreeMap<String, (Picture, Places)>, Cor
     let corpus = Corpus::open(folder)?;
     let mut found = BTreeMap::new();
     for scene in corpus.scenes() {
-        let zones = || corpus.zones().iter().filter(|z| z.scene == scene);
+        let zones = || corpus.zones().iter().map(|zone| &zone.row).filter(|row| row.scene == scene);
         let width = zones().map(|z| z.x + z.width).max().unwrap_or(1);
         let height = zones().map(|z| z.y + z.height).max().unwrap_or(1);
         let mut pixels = vec![GREY; width * height];
@@ -111,7 +111,7 @@ fn pictures_of(folder: &Path) -> Result<BTreeMap<String, (Picture, Places)>, Cor
                 pixels[(zone.y + i / zone.width) * width + zone.x + i % zone.width] = shown;
             }
         }
-        let place = |z: &JudgedZone| {
+        let place = |z: &ThresholdRow| {
             let tile = Tile { index: z.zone as usize, x: z.x, y: z.y, width: z.width, height: z.height };
             ((z.scene.clone(), z.zone), tile)
         };

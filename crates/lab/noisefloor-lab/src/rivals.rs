@@ -127,18 +127,18 @@ impl RatedRival {
     /// `stops` are samples per pixel: a row for each constant, a column for each zone.
     fn of(rival: &'static Rival, zones: &[JudgedZone], stops: &[Vec<f64>]) -> Self {
         let constants = constants(rival);
-        let group = |zone: &JudgedZone| first_word(&zone.scene).to_owned();
+        let group = |zone: &JudgedZone| first_word(&zone.row.scene).to_owned();
         let predict = |(i, zone): (usize, &JudgedZone)| {
             let others = |j: usize| group(&zones[j]) != group(zone);
             let place = unbiased(stops, zones, &others);
             Prediction {
-                scene: zone.scene.clone(),
-                zone: zone.zone,
-                human_spp: zone.human_spp,
+                scene: zone.row.scene.clone(),
+                zone: zone.row.zone,
+                human_spp: zone.row.human_spp,
                 predicted_spp: at(stops, i, place),
                 stop_spp: at(stops, i, place),
-                human_as_noise: as_noise(zone.human_spp, zone.reference_spp),
-                censored: zone.censored,
+                human_as_noise: as_noise(zone.row.human_spp, zone.reference_spp()),
+                censored: zone.censored(),
                 unfamiliar: false,
                 images_right: 0,
                 images: 0,
@@ -198,8 +198,8 @@ fn unbiased(stops: &[Vec<f64>], zones: &[JudgedZone], counts: &dyn Fn(usize) -> 
             zones
                 .iter()
                 .enumerate()
-                .filter(|(i, zone)| !zone.censored && counts(*i))
-                .map(|(i, zone)| (at(stops, i, place) / zone.human_spp).ln()),
+                .filter(|(i, zone)| !zone.censored() && counts(*i))
+                .map(|(i, zone)| (at(stops, i, place) / zone.row.human_spp).ln()),
         )
     };
     // Stops fall as constants get lax, but not always: look everywhere.
@@ -211,10 +211,11 @@ fn unbiased(stops: &[Vec<f64>], zones: &[JudgedZone], counts: &dyn Fn(usize) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use noisefloor_learn::{ThresholdRow, ZoneImages};
 
     fn zone(scene: &str, human_spp: f64) -> JudgedZone {
-        let stack = noisefloor_learn::ZoneImages::Batches(PathBuf::new());
-        JudgedZone {
+        let stack = ZoneImages::Batches(PathBuf::new());
+        let row = ThresholdRow {
             scene: scene.into(),
             renderer: String::new(),
             zone: 0,
@@ -223,12 +224,11 @@ mod tests {
             width: 16,
             height: 16,
             human_spp,
-            censored: false,
             first_spp: 1,
             last_spp: 10_000,
-            reference_spp: f64::INFINITY,
-            stack,
-        }
+            reference_spp: None,
+        };
+        JudgedZone { row, stack }
     }
 
     /// Three constants stop every zone at 100, 200 and 400 samples; people want 200 in one scene and 283 in

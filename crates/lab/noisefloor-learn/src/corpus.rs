@@ -49,10 +49,10 @@ impl Corpus {
             match &stack {
                 ZoneImages::Batches(folder) => {
                     let other = |zone: &&JudgedZone| {
-                        matches!(zone.stack, ZoneImages::Batches(_)) && zone.scene != row.scene
+                        matches!(zone.stack, ZoneImages::Batches(_)) && zone.row.scene != row.scene
                     };
                     if let Some(other) = zones.iter().find(other) {
-                        let (one, other) = (other.scene.clone(), row.scene);
+                        let (one, other) = (other.row.scene.clone(), row.scene);
                         return Err(CorpusError::Scenes { dir: dir.to_owned(), one, other });
                     }
                     batches(folder)?;
@@ -62,7 +62,7 @@ impl Corpus {
                 }
                 ZoneImages::RunningMeans(_) => {}
             }
-            zones.push(row.into_zone(stack));
+            zones.push(JudgedZone { row, stack });
         }
         Ok(Self { zones })
     }
@@ -76,8 +76,8 @@ impl Corpus {
     pub fn scenes(&self) -> Vec<&str> {
         let mut scenes: Vec<&str> = Vec::new();
         for zone in &self.zones {
-            if !scenes.contains(&zone.scene.as_str()) {
-                scenes.push(&zone.scene);
+            if !scenes.contains(&zone.row.scene.as_str()) {
+                scenes.push(&zone.row.scene);
             }
         }
         scenes
@@ -96,7 +96,7 @@ impl Corpus {
     }
 
     fn scene_zones(&self, scene: &str) -> Result<Vec<&JudgedZone>, CorpusError> {
-        let zones: Vec<&JudgedZone> = self.zones.iter().filter(|zone| zone.scene == scene).collect();
+        let zones: Vec<&JudgedZone> = self.zones.iter().filter(|zone| zone.row.scene == scene).collect();
         if zones.is_empty() {
             return Err(CorpusError::Unknown { scene: scene.to_owned(), known: self.scenes().join(", ") });
         }

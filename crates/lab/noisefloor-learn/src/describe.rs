@@ -95,13 +95,13 @@ fn describe(
         for scene in corpus.scenes() {
             on_zone(zones.len(), all);
             let images: Vec<Image> = corpus.scene_levels(scene)?.collect::<Result<_, _>>()?;
-            let of_scene: Vec<_> = corpus.zones().iter().filter(|z| z.scene == scene).collect();
+            let of_scene: Vec<_> = corpus.zones().iter().filter(|z| z.row.scene == scene).collect();
             let references =
                 if evidence == Evidence::Reference { corpus.scene_reference(scene)? } else { None };
             let describe = |(i, zone): (usize, &&JudgedZone)| {
-                let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.zone).collect();
+                let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.row.zone).collect();
                 let material = Material::of(zone, &images, references.as_ref().map(|r| &r[i]))?;
-                let group = (corpora.group_of)(&zone.scene);
+                let group = (corpora.group_of)(&zone.row.scene);
                 let mut shown = levels(&of_scene, zone, &material)?;
                 shown.iter_mut().for_each(|(_, _, planes)| planes.viewing = corpora.viewing);
                 let (described, levels) = describe_zone(zone, group, shown, descriptor)?;
@@ -121,10 +121,11 @@ fn describe(
 
 /// The levels that are synthesised for each zone of a scene, in samples per pixel.
 fn synthesised_levels(zones: &[&JudgedZone]) -> Vec<f64> {
-    let least = |z: &&JudgedZone| (z.first_spp as f64).min(z.human_spp / REACH);
+    let least = |z: &&JudgedZone| (z.row.first_spp as f64).min(z.row.human_spp / REACH);
     // Noise as weak as the difference that was just seen may lie beyond the last picture
-    let as_noise = |z: &&JudgedZone| as_noise(z.human_spp.min(0.9 * z.reference_spp), z.reference_spp);
-    let most = |z: &&JudgedZone| (z.last_spp as f64).max(as_noise(z) * REACH);
+    let as_noise =
+        |z: &&JudgedZone| as_noise(z.row.human_spp.min(0.9 * z.reference_spp()), z.reference_spp());
+    let most = |z: &&JudgedZone| (z.row.last_spp as f64).max(as_noise(z) * REACH);
     let low = zones.iter().map(least).fold(f64::INFINITY, f64::min);
     let high = zones.iter().map(most).fold(0.0, f64::max);
     let grid = GRID.map(|k| (10.0 * 2f64.powf(0.75 * f64::from(k))).round());
@@ -155,14 +156,14 @@ fn describe_zone(
     }
     levels.sort_by(|a, b| a.spp.total_cmp(&b.spp));
     let zone = Zone {
-        scene: zone.scene.clone(),
+        scene: zone.row.scene.clone(),
         group: group.to_owned(),
-        zone: zone.zone,
-        human_spp: zone.human_spp,
-        censored: zone.censored,
-        first_spp: zone.first_spp as f64,
-        last_spp: zone.last_spp as f64,
-        reference_spp: zone.reference_spp,
+        zone: zone.row.zone,
+        human_spp: zone.row.human_spp,
+        censored: zone.censored(),
+        first_spp: zone.row.first_spp as f64,
+        last_spp: zone.row.last_spp as f64,
+        reference_spp: zone.reference_spp(),
         levels: Vec::new(),
     };
     Ok((zone, levels))

@@ -44,20 +44,21 @@ pub(super) fn stages(first: f64, last: f64) -> Vec<[u64; 2]> {
 
 impl SynthesisedRendering {
     pub(super) fn of(corpus: &Corpus, scene: &str) -> Result<Self, LabError> {
-        let zones: Vec<JudgedZone> = corpus.zones().iter().filter(|z| z.scene == scene).cloned().collect();
-        let edge = zones[0].width;
-        if zones.iter().any(|z| z.width != edge || z.height != edge) {
+        let zones: Vec<JudgedZone> =
+            corpus.zones().iter().filter(|z| z.row.scene == scene).cloned().collect();
+        let edge = zones[0].row.width;
+        if zones.iter().any(|z| z.row.width != edge || z.row.height != edge) {
             return Err(LabError::Zones { scene: scene.to_owned() });
         }
         let mut levels: Vec<Vec<JudgedImage>> = zones.iter().map(|_| Vec::new()).collect();
         for level in corpus.scene_levels(scene)? {
             let level = level?;
-            if let Some(i) = zones.iter().position(|z| z.zone == level.zone) {
+            if let Some(i) = zones.iter().position(|z| z.row.zone == level.zone) {
                 levels[i].push(level);
             }
         }
-        let first = zones.iter().map(|z| z.first_spp).min().unwrap_or(1) as f64;
-        let last = zones.iter().map(|z| z.last_spp).max().unwrap_or(1) as f64;
+        let first = zones.iter().map(|z| z.row.first_spp).min().unwrap_or(1) as f64;
+        let last = zones.iter().map(|z| z.row.last_spp).max().unwrap_or(1) as f64;
         let noises = levels.iter().map(|of_zone| Noise::of(of_zone)).collect::<Option<Vec<_>>>();
         let noises = noises.ok_or_else(|| LabError::TooFewImages { scene: scene.to_owned() })?;
         let batch = |(turn, samples): (usize, u64)| -> Batch {
@@ -133,10 +134,10 @@ impl SynthesisedRendering {
             })
             .collect();
         let stop = |(zone, needed): (&JudgedZone, &Vec<f64>)| {
-            let (first, last) = (zone.first_spp as f64, zone.last_spp as f64);
+            let (first, last) = (zone.row.first_spp as f64, zone.row.last_spp as f64);
             let stage = needed.iter().position(|least| *least <= constant);
             let between = |stage: usize| ((totals[stage.saturating_sub(1)] * totals[stage]) as f64).sqrt();
-            as_difference(stage.map_or(f64::INFINITY, between), zone.reference_spp).clamp(first, last)
+            as_difference(stage.map_or(f64::INFINITY, between), zone.reference_spp()).clamp(first, last)
         };
         self.zones.iter().zip(needed).map(stop).collect()
     }

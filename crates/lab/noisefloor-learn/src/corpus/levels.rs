@@ -1,6 +1,7 @@
 //! The images of zones, cut out with a halo.
 
 use super::error::CorpusError;
+use super::table::ThresholdRow;
 use super::zone::{JudgedZone, ZoneImages};
 use noisefloor::{Rgb, internal::HALO};
 use noisefloor_image::{
@@ -135,25 +136,25 @@ impl<'a> JudgedImages<'a> {
             Picture::Linear(image) => (Encoding::Linear, &image.pixels),
             Picture::Display(image) => (Encoding::Display, &image.pixels),
         };
-        for zone in &job.zones {
+        for row in job.zones.iter().map(|zone| &zone.row) {
             // A batch is only the zone
-            let (x, y) = if job.batch { (0, 0) } else { (zone.x, zone.y) };
+            let (x, y) = if job.batch { (0, 0) } else { (row.x, row.y) };
             let (exact, inside) = (
-                (zone.width, zone.height) == size,
-                x.saturating_add(zone.width) <= width && y.saturating_add(zone.height) <= height,
+                (row.width, row.height) == size,
+                x.saturating_add(row.width) <= width && y.saturating_add(row.height) <= height,
             );
             if !inside || job.batch && !exact {
-                let (path, scene) = (path.clone(), zone.scene.clone());
-                return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
+                let (path, scene) = (path.clone(), row.scene.clone());
+                return Err(CorpusError::Zone { path, scene, zone: row.zone, width, height });
             }
             self.ready.push_back(JudgedImage {
-                scene: zone.scene.clone(),
-                zone: zone.zone,
+                scene: row.scene.clone(),
+                zone: row.zone,
                 first: if job.batch { job.frame.first } else { 0 },
                 last: job.frame.last,
                 encoding,
                 rounding: picture.rounding(),
-                patch: cut(pixels, size, Inner { x, y, width: zone.width, height: zone.height }, HALO),
+                patch: cut(pixels, size, Inner { x, y, width: row.width, height: row.height }, HALO),
             });
         }
         Ok(())
@@ -174,10 +175,10 @@ pub(super) fn reference(zones: &[&JudgedZone]) -> Result<Option<Vec<Patch>>, Cor
     let image = read_exr(&path).map_err(StackError::from)?;
     let (width, height) = (image.width, image.height);
     let cut_out = |zone: &&JudgedZone| {
-        let JudgedZone { x, y, width: w, height: h, .. } = **zone;
+        let ThresholdRow { x, y, width: w, height: h, .. } = zone.row;
         if x.saturating_add(w) > width || y.saturating_add(h) > height {
-            let (path, scene) = (path.clone(), zone.scene.clone());
-            return Err(CorpusError::Zone { path, scene, zone: zone.zone, width, height });
+            let (path, scene) = (path.clone(), zone.row.scene.clone());
+            return Err(CorpusError::Zone { path, scene, zone: zone.row.zone, width, height });
         }
         // A batch is only the zone
         let halo = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { HALO };

@@ -1,7 +1,6 @@
 //! `thresholds.csv`.
 
 use super::error::CorpusError;
-use super::zone::{CENSORED_SPP, JudgedZone, ZoneImages};
 use crate::stimulus::{REFERENCE, parse_reference};
 use csv::{ErrorKind, Position, ReaderBuilder, Trim};
 use noisefloor::tile::MAX_EDGE;
@@ -14,19 +13,25 @@ use std::path::{Component, Path};
 /// Longest table that is read, in bytes: some hundred thousand zones.
 const MAX_TABLE_BYTES: u64 = 16 << 20;
 
-/// A line of `thresholds.csv`: a zone, and what observers said of it. The fields are those of
-/// [`JudgedZone`](super::JudgedZone).
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// A line of `thresholds.csv`: a zone, and what observers said of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ThresholdRow {
     pub scene: String,
     pub renderer: String,
+    /// Row-major number of the zone in the scene.
     pub zone: u32,
+    /// Left edge in the full picture, in pixels.
     pub x: usize,
+    /// Top edge in the full picture, in pixels.
     pub y: usize,
     pub width: usize,
     pub height: usize,
+    /// Mean samples per pixel at which observers could no longer tell the zone from the reference; positive.
     pub human_spp: f64,
+    /// Samples per pixel of the least converged image observers could choose.
     pub first_spp: u64,
+    /// Samples per pixel of the most converged image observers could choose. Not all images up to it need be
+    /// here.
     pub last_spp: u64,
     /// As given; by default that of the last running mean, or a clean one beside batches.
     #[serde(default, deserialize_with = "reference", skip_serializing_if = "Option::is_none")]
@@ -35,31 +40,6 @@ pub struct ThresholdRow {
 
 fn reference<'a, D: Deserializer<'a>>(from: D) -> Result<Option<f64>, D::Error> {
     parse_reference(&String::deserialize(from)?).map(Some).map_err(D::Error::custom)
-}
-
-impl ThresholdRow {
-    pub(super) fn into_zone(self, stack: ZoneImages) -> JudgedZone {
-        let censored = self.human_spp >= CENSORED_SPP || self.human_spp >= self.last_spp as f64;
-        let nested = matches!(stack, ZoneImages::RunningMeans(_));
-        let reference_spp =
-            self.reference_spp.unwrap_or(if nested { self.last_spp as f64 } else { f64::INFINITY });
-        let Self { scene, renderer, zone, x, y, width, height, human_spp, first_spp, last_spp, .. } = self;
-        JudgedZone {
-            scene,
-            renderer,
-            zone,
-            x,
-            y,
-            width,
-            height,
-            human_spp,
-            censored,
-            first_spp,
-            last_spp,
-            reference_spp,
-            stack,
-        }
-    }
 }
 
 pub(super) fn read(path: &Path) -> Result<Vec<ThresholdRow>, CorpusError> {

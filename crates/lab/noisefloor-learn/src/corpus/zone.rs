@@ -1,5 +1,6 @@
 //! What observers said of one zone, and where its images are.
 
+use super::table::ThresholdRow;
 use std::path::PathBuf;
 
 /// A threshold at or above this many samples per pixel is censored: observers were offered no more.
@@ -17,28 +18,21 @@ pub enum ZoneImages {
 /// One zone of a scene, and the threshold observers gave for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JudgedZone {
-    pub scene: String,
-    pub renderer: String,
-    /// Row-major number of the zone in the scene.
-    pub zone: u32,
-    /// Left edge in the full picture, in pixels.
-    pub x: usize,
-    /// Top edge in the full picture, in pixels.
-    pub y: usize,
-    pub width: usize,
-    pub height: usize,
-    /// Mean samples per pixel at which observers could no longer tell the zone from the reference; positive.
-    pub human_spp: f64,
-    /// Whether `human_spp` is only a lower bound: it is at least 10,000, or at least `last_spp`.
-    /// Keep it out of means.
-    pub censored: bool,
-    /// Samples per pixel of the least converged image observers could choose.
-    pub first_spp: u64,
-    /// Samples per pixel of the most converged image observers could choose. Not all images up to it need be
-    /// here.
-    pub last_spp: u64,
+    /// As the table has it.
+    pub row: ThresholdRow,
+    pub stack: ZoneImages,
+}
+
+impl JudgedZone {
+    /// Whether the threshold is only a lower bound: it is at least 10,000, or at least `last_spp`. Keep it out of means.
+    pub fn censored(&self) -> bool {
+        self.row.human_spp >= CENSORED_SPP || self.row.human_spp >= self.row.last_spp as f64
+    }
+
     /// Samples per pixel of the picture that people compared with, if it contains those of the pictures they judged;
     /// infinite if it had no noise. See [`crate::as_noise`].
-    pub reference_spp: f64,
-    pub stack: ZoneImages,
+    pub fn reference_spp(&self) -> f64 {
+        let nested = matches!(self.stack, ZoneImages::RunningMeans(_));
+        self.row.reference_spp.unwrap_or(if nested { self.row.last_spp as f64 } else { f64::INFINITY })
+    }
 }

@@ -57,7 +57,7 @@ impl Material {
     ) -> Result<Self, TableError> {
         let running = images.iter().all(|i| i.first == 0 && i.encoding == Encoding::Display);
         let material = if running { Self::from_running_means(images) } else { Self::from_batches(images) };
-        let (scene, zone, images) = (zone.scene.clone(), zone.zone, images.len());
+        let (scene, zone, images) = (zone.row.scene.clone(), zone.row.zone, images.len());
         let Some(mut material) = material else { return Err(TableError::TooFew { scene, zone, images }) };
         if let Some(patch) = reference {
             let size = material.size;
@@ -260,5 +260,5 @@ impl Material {
 
 /// A zone of a size that the descriptor is not for.
 pub(super) fn does_not_fit(zone: &JudgedZone, source: noisefloor::descriptor::DescriptorError) -> TableError {
-    TableError::Descriptor { scene: zone.scene.clone(), zone: zone.zone, source }
+    TableError::Descriptor { scene: zone.row.scene.clone(), zone: zone.row.zone, source }
 }

@@ -1,6 +1,6 @@
 use noisefloor_image::{RenderLayers, StackError, StackFault, write_exr, write_png};
 use noisefloor_learn::CorpusError;
-use noisefloor_learn::{Corpus, Encoding, Inner, JudgedZone, ZoneImages, zone_levels};
+use noisefloor_learn::{Corpus, Encoding, Inner, ZoneImages, zone_levels};
 use std::path::Path;
 
 const HEADER: &str = "scene,renderer,zone,x,y,width,height,human_spp,first_spp,last_spp\n";
@@ -39,11 +39,11 @@ fn running_means_with_halos() {
     assert_eq!((corpus.scenes(), corpus.zones().len()), (vec!["Kitchen", "Bath"], 8));
     let zone = &corpus.zones()[1];
     assert_eq!(
-        (zone.scene.as_str(), zone.zone, zone.x, zone.human_spp, zone.censored),
+        (zone.row.scene.as_str(), zone.row.zone, zone.row.x, zone.row.human_spp, zone.censored()),
         ("Kitchen", 1, 20, 70.0, false)
     );
     // At the most converged image observers could choose
-    assert!(corpus.zones()[4].censored);
+    assert!(corpus.zones()[4].censored());
 
     let levels: Vec<_> = corpus.scene_levels("Kitchen").unwrap().map(Result::unwrap).collect();
     assert_eq!(levels.len(), 12);
@@ -89,7 +89,7 @@ fn batches_of_zones() {
     let corpus = Corpus::open(folder.path()).unwrap();
     assert_eq!(corpus.zones()[1].stack, ZoneImages::Batches(folder.path().join("zone01")));
     // 10000 means at or above 10,000
-    assert_eq!(corpus.zones().iter().map(|z| z.censored).collect::<Vec<_>>(), [false, true]);
+    assert_eq!(corpus.zones().iter().map(|z| z.censored()).collect::<Vec<_>>(), [false, true]);
     let levels: Vec<_> = corpus.scene_levels("stairs").unwrap().map(Result::unwrap).collect();
     let order: Vec<_> = levels.iter().map(|l| (l.zone, l.first, l.last)).collect();
     assert_eq!(order, [(0, 0, 20), (0, 20, 60), (1, 0, 20), (1, 20, 60)]);
@@ -172,7 +172,8 @@ fn zones_must_fit_their_images() {
     assert!(levels.next().is_none());
 
     // A zone of one's own making
-    let zone = JudgedZone { x: usize::MAX, ..corpus.zones()[0].clone() };
+    let mut zone = corpus.zones()[0].clone();
+    zone.row.x = usize::MAX;
     assert!(matches!(zone_levels(&zone).unwrap().next(), Some(Err(CorpusError::Zone { .. }))));
 
     // An image of another size in the middle of the stack

@@ -59,7 +59,7 @@ fn thresholds_come_back_from_the_server_as_a_corpus() {
     let corpus = Corpus::open(out.join("corpus-simulated")).unwrap();
     assert_eq!((corpus.scenes(), corpus.zones().len()), (vec!["wall", "door"], 4));
     for (zone, tile) in corpus.zones().iter().zip(&report.tiles) {
-        assert!((zone.human_spp - tile.level95.min(levels[23] as f64)).abs() < 1e-6);
+        assert!((zone.row.human_spp - tile.level95.min(levels[23] as f64)).abs() < 1e-6);
     }
     assert_eq!(corpus.scene_levels("wall").unwrap().count(), 48);
     for file in [
