@@ -83,6 +83,16 @@ def camera(at, to, lens):
     return data
 
 
+def composited(made):
+    """Gives a scene a compositor: its tree, and the node of what it makes."""
+    if hasattr(made, "compositing_node_group"):
+        tree = made.compositing_node_group = bpy.data.node_groups.new("after", "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        return tree, tree.nodes.new("NodeGroupOutput")
+    made.use_nodes = True
+    return made.node_tree, made.node_tree.nodes["Composite"]
+
+
 def window():
     """A room that is lit through a pane of glass."""
     made, wall = scene("AgX", sky=(0.5, 0.7, 1), strength=1.5), material((0.75, 0.72, 0.68), Roughness=0.9)
@@ -172,13 +182,7 @@ def layers():
         made.collection.children[name].objects.link(thing)
     lamp("AREA", (3, -3, 5), (0, 0, 0), 400, size=1.5)
     camera((0, -6, 2.4), (0, 0, 0.6), 45)
-    if hasattr(made, "compositing_node_group"):
-        tree = made.compositing_node_group = bpy.data.node_groups.new("over", "CompositorNodeTree")
-        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-        end = tree.nodes.new("NodeGroupOutput")
-    else:
-        made.use_nodes = True
-        tree, end = made.node_tree, made.node_tree.nodes["Composite"]
+    tree, end = composited(made)
     over, glow, ends = tree.nodes.new("CompositorNodeAlphaOver"), tree.nodes.new("CompositorNodeGlare"), []
     for layer in (back, front):
         ends.append(tree.nodes.new("CompositorNodeRLayers"))

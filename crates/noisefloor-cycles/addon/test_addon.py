@@ -942,13 +942,7 @@ class Addon(unittest.TestCase):
     def test_a_denoise_node_that_follows_is_noticed(self):
         scene = room()
         self.assertFalse(compositor.denoises(scene))
-        if hasattr(scene, "compositing_node_group"):
-            tree = scene.compositing_node_group = bpy.data.node_groups.new("after", "CompositorNodeTree")
-            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-            out = tree.nodes.new("NodeGroupOutput")
-        else:
-            scene.use_nodes = True
-            tree, out = scene.node_tree, scene.node_tree.nodes["Composite"]
+        tree, out = scenes.composited(scene)
         scene.render.use_compositing = True
         node = tree.nodes.new("CompositorNodeDenoise")
         self.assertFalse(compositor.denoises(scene), "nobody sees what it makes")
