@@ -1,12 +1,13 @@
 //! Halves are equals, and light that one of them alone has found is seen. These tests know the public interface alone.
 
+use crate::kit::Bilateral;
 use noisefloor::{
     Oracle, Params, Request, Rgb, Session, Stop, StopReason, StoppingCriterion, ToneMapping, Verdict,
     display::{Display, ToneCurve},
     tune::{Looked, PicturePair},
 };
-use noisefloor_denoise::{DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
-use noisefloor_testkit::{Noise, bilateral};
+use noisefloor_denoise::DenoisedQuality;
+use noisefloor_testkit::Noise;
 use noisefloor_vision::{Viewing, VisionModel, VisionWorkspace};
 
 type Criterion = Box<dyn StoppingCriterion + Send>;
@@ -61,18 +62,6 @@ fn outcome(criterion: Criterion, params: &Params, halves: [(u64, &[Rgb]); 2]) ->
         picture: session.film().image(),
         to_go: session.expected_samples_to_go(),
         share: session.share_in_picture(),
-    }
-}
-
-struct Bilateral;
-
-impl Denoiser for Bilateral {
-    fn name(&self) -> String {
-        "bilateral".into()
-    }
-
-    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
-        Ok(bilateral(picture.size, picture.radiance, 0.1))
     }
 }
 

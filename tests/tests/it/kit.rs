@@ -2,10 +2,23 @@ use noisefloor::{
     Batch, Counts, ProgressiveSource, Repeats, Request, Rgb, SourceError, SourceInfo, Unit,
     source::{FirstHits, PixelNoise, Reference},
 };
+use noisefloor_denoise::{DenoiseError, Denoiser, NoisyPicture};
 use noisefloor_sidecar::{Renderer, find, probe};
-use noisefloor_testkit::{Noise, Requirement, require};
+use noisefloor_testkit::{Noise, Requirement, bilateral, require};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
+
+pub(crate) struct Bilateral;
+
+impl Denoiser for Bilateral {
+    fn name(&self) -> String {
+        "bilateral".into()
+    }
+
+    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
+        Ok(bilateral(picture.size, picture.radiance, 0.1))
+    }
+}
 
 /// Noise without a renderer. A sample of a pixel is `radiance`·(1 ± `noise`), one as likely as the other. All
 /// follows from (seed, pixel, sample).

@@ -1,7 +1,7 @@
 //! What went wrong once, or could, where two features meet: every combination of criterion, exposure and display, cut
 //! anywhere. Faults of one feature are tested beside its code.
 
-use crate::kit::{Altered, Synthetic};
+use crate::kit::{Altered, Bilateral, Synthetic};
 use noisefloor::{
     Driver, Event, Oracle, Params, ProgressiveSource, Rgb, Schedule, StopReason, StoppingCriterion,
     ToneMapping, Viewing,
@@ -9,21 +9,8 @@ use noisefloor::{
     display::{Display, ToneCurve},
     watch::Warning,
 };
-use noisefloor_denoise::{DenoiseError, DenoisedQuality, Denoiser, NoisyPicture};
-use noisefloor_testkit::bilateral;
+use noisefloor_denoise::DenoisedQuality;
 use std::sync::atomic::Ordering;
-
-struct Bilateral;
-
-impl Denoiser for Bilateral {
-    fn name(&self) -> String {
-        "bilateral".into()
-    }
-
-    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
-        Ok(bilateral(picture.size, picture.radiance, 0.1))
-    }
-}
 
 type New = fn() -> Box<dyn StoppingCriterion + Send>;
 

@@ -207,19 +207,6 @@ fn failures_are_said() {
     assert!(why.contains("out of order"), "{why}");
 }
 
-/// Returns a pixel too few.
-struct Short;
-
-impl Denoiser for Short {
-    fn name(&self) -> String {
-        "short".into()
-    }
-
-    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
-        Ok(picture.radiance[1..].to_vec())
-    }
-}
-
 /// Returns no parts.
 struct Partless;
 
@@ -248,7 +235,7 @@ fn denoisers_that_return_too_little_are_refused() {
         Err(SessionError::Criterion(CriterionError::Failed { why, .. })) => why,
         other => panic!("{other:?}"),
     };
-    let short = why(run(&mut session(Short)));
+    let short = why(run(&mut session(Simple::Short)));
     assert!(short.contains("24575 pixels, not 192×128"), "{short}");
     let partless = why(run(&mut session(Partless)));
     assert!(partless.contains("asked for 1 parts, and returned 0"), "{partless}");

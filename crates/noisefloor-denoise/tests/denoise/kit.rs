@@ -33,6 +33,8 @@ pub(crate) enum Simple {
     Flat(f32),
     /// The bilateral filter of the test kit.
     Bilateral(f32),
+    /// It returns a pixel too few.
+    Short,
     /// It fails.
     Fails,
 }
@@ -47,6 +49,7 @@ impl Denoiser for Simple {
             Self::Nothing => Ok(picture.radiance.to_vec()),
             Self::Flat(grey) => Ok(vec![[grey; 3]; picture.radiance.len()]),
             Self::Bilateral(range) => Ok(bilateral(picture.size, picture.radiance, range)),
+            Self::Short => Ok(picture.radiance[1..].to_vec()),
             Self::Fails => Err(DenoiseError::Failed { name: self.name(), cause: "out of order".into() }),
         }
     }

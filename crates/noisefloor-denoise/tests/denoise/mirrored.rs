@@ -95,23 +95,10 @@ fn what_a_denoiser_keeps_is_kept() {
     assert_eq!([0, 2, 3, 8].map(DenoisePasses::new), [None; 4]);
 }
 
-/// Returns a pixel too few.
-struct Short;
-
-impl Denoiser for Short {
-    fn name(&self) -> String {
-        "short".into()
-    }
-
-    fn denoise(&mut self, picture: &NoisyPicture<'_>) -> Result<Vec<Rgb>, DenoiseError> {
-        Ok(picture.radiance[1..].to_vec())
-    }
-}
-
 #[test]
 fn pictures_of_another_size_are_refused() {
     let picture = noisy(5, 0.1);
-    let mut four = MirrorMean::new(Short, DenoisePasses::Four);
+    let mut four = MirrorMean::new(Simple::Short, DenoisePasses::Four);
     assert!(matches!(four.denoise(&NoisyPicture::new(SIZE, &picture)), Err(DenoiseError::Pixels { .. })));
     let mut four = MirrorMean::new(Simple::Nothing, DenoisePasses::Four);
     let odd = NoisyPicture::new((SIZE.0, 3), &picture);
