@@ -96,11 +96,23 @@ impl Default for NfParams {
 }
 
 impl NfParams {
+    /// Those that a caller gives, or the defaults.
+    ///
+    /// # Safety
+    /// As [`border::object`], if `given` is not null; and as [`Self::to_params`].
+    pub(crate) unsafe fn or(given: *const Self, defaults: Params) -> Result<Params, Failure> {
+        if given.is_null() {
+            return Ok(defaults);
+        }
+        // SAFETY: as for this function.
+        unsafe { border::object(given, "params")?.to_params() }
+    }
+
     /// The same for Rust; ranges are left to be checked by the session.
     ///
     /// # Safety
     /// `viewing` is null, or leads to text.
-    pub(crate) unsafe fn to_params(self) -> Result<Params, Failure> {
+    unsafe fn to_params(self) -> Result<Params, Failure> {
         let unknown = |what: &str, value: u32| {
             Failure::new(NfStatus::Argument, format!("{value} is no {what}: use a constant of noisefloor.h"))
         };

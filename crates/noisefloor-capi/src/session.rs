@@ -171,12 +171,8 @@ pub unsafe extern "C" fn nf_session_new(
 ) -> NfStatus {
     guard(|| {
         let oracle = handle::get(oracle)?;
-        let params = if params.is_null() {
-            Params::default()
-        } else {
-            // SAFETY: not null, and promised by the caller.
-            unsafe { border::object(params, "params")?.to_params() }?
-        };
+        // SAFETY: promised by the caller.
+        let params = unsafe { NfParams::or(params, Params::default()) }?;
         let make = || NfSession::new((width, height), Judging::Noise(Box::new(oracle.0.clone())), params);
         // SAFETY: promised by the caller.
         unsafe { handle::give(session, make) }
@@ -210,12 +206,9 @@ pub unsafe extern "C" fn nf_session_new_denoised(
             let message = format!("lost must be a positive number of JOD, not {lost}");
             return Err(Failure::new(NfStatus::Argument, message));
         }
-        let params = if params.is_null() {
-            Params::default().with_schedule(Schedule::Growing { step: 48 }).with_min_spp(48)
-        } else {
-            // SAFETY: not null, and promised by the caller.
-            unsafe { border::object(params, "params")?.to_params() }?
-        };
+        let defaults = Params::default().with_schedule(Schedule::Growing { step: 48 }).with_min_spp(48);
+        // SAFETY: promised by the caller.
+        let params = unsafe { NfParams::or(params, defaults) }?;
         TileGrid::new(width, height, params.tile)?;
         let guides = match first_hits.is_null() {
             true => None,

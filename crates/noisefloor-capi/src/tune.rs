@@ -262,13 +262,8 @@ unsafe fn pictures<const N: usize>(
     pictures: [*const f32; N],
     floats: usize,
 ) -> Result<(Params, [Vec<Rgb>; N]), Failure> {
-    let params = if params.is_null() {
-        Params::default()
-    } else {
-        // SAFETY: not null, and as for this function.
-        unsafe { border::object(params, "params")?.to_params() }?
-    };
-    let params = params.with_tile(TILE);
+    // SAFETY: as for this function.
+    let params = unsafe { NfParams::or(params, Params::default()) }?.with_tile(TILE);
     params.check()?;
     check_image(width as usize, height as usize)?;
     let wanted = 3 * width as usize * height as usize;
