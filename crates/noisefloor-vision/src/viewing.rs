@@ -250,15 +250,6 @@ impl Viewing {
         Self(ViewingParams { frames_per_second: None, ..self.0 })
     }
 
-    /// The same display at `factor` times the distance. Exact for pixels that are small against the distance.
-    ///
-    /// # Errors
-    /// If the pixels per degree leave their range.
-    pub fn at_distance(&self, factor: f64) -> Result<Self, ViewingError> {
-        let pixels_per_degree = self.0.pixels_per_degree * factor;
-        ViewingParams { pixels_per_degree, ..self.0 }.check()
-    }
-
     /// Light of the room that the display reflects, in cd/m²: that of a diffuse reflector (Mantiuk 2016, §3).
     pub fn reflected(&self) -> f64 {
         self.0.ambient / PI * self.0.reflectivity
