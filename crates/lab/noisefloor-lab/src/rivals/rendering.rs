@@ -44,8 +44,7 @@ pub(super) fn stages(first: f64, last: f64) -> Vec<[u64; 2]> {
 
 impl SynthesisedRendering {
     pub(super) fn of(corpus: &Corpus, scene: &str) -> Result<Self, LabError> {
-        let zones: Vec<JudgedZone> =
-            corpus.zones().iter().filter(|z| z.row.scene == scene).cloned().collect();
+        let zones: Vec<_> = corpus.zones().iter().filter(|z| z.row.scene == scene).cloned().collect();
         let edge = zones[0].row.width;
         if zones.iter().any(|z| z.row.width != edge || z.row.height != edge) {
             return Err(LabError::Zones { scene: scene.to_owned() });
