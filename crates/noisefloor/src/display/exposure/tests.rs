@@ -143,8 +143,7 @@ fn black_is_left_out_and_unmet_light_is_not() {
     assert_eq!(estimate(SIZE, |_, _| None), None);
 }
 
-/// A surface beside one that falls off through 26 decades, as a smooth metal does: by itself it is known, and so is the
-/// picture, within as much as the last decade that counts.
+/// A surface beside one that falls off through 26 decades, as a smooth metal does.
 #[test]
 fn what_no_screen_shows_counts_as_black() {
     let bright = |x: usize| x < SIZE.0 / 2;
