@@ -11,28 +11,28 @@ pub(crate) fn saved<C: StoppingCriterion>(session: &Session<C>) -> Vec<u8> {
     bytes
 }
 
-/// A criterion that is a function of the tiles that are due, and cannot be saved.
-struct Whim<F>(Needs, F);
+type Judge = dyn FnMut(&View<'_>, &[Tile]) -> Result<Vec<Verdict>, CriterionError> + Send;
+
+/// A criterion that is a function of the tiles that are due, and cannot be saved. It is one type whatever the function:
+/// sessions of as many types as there are functions take a minute to compile.
+pub(crate) struct Whim(Needs, Box<Judge>);
 
 pub(crate) fn judging(
     needs: Needs,
     judge: impl FnMut(&View<'_>, &[Tile]) -> Result<Vec<Verdict>, CriterionError> + Send + 'static,
-) -> impl StoppingCriterion + Send + 'static {
-    Whim(needs, judge)
+) -> Whim {
+    Whim(needs, Box::new(judge))
 }
 
 /// The same by a function of each tile.
 pub(crate) fn judging_each(
     needs: Needs,
     mut judge: impl FnMut(&View<'_>, &Tile) -> Verdict + Send + 'static,
-) -> impl StoppingCriterion + Send + 'static {
+) -> Whim {
     judging(needs, move |view, tiles| Ok(tiles.iter().map(|tile| judge(view, tile)).collect()))
 }
 
-impl<F> StoppingCriterion for Whim<F>
-where
-    F: FnMut(&View<'_>, &[Tile]) -> Result<Vec<Verdict>, CriterionError>,
-{
+impl StoppingCriterion for Whim {
     fn name(&self) -> String {
         "a whim".into()
     }
