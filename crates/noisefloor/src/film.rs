@@ -408,6 +408,19 @@ impl Film {
         Ok((new, pixels.map(new_of).collect()))
     }
 
+    /// The same of tiles in a running mean of the whole image.
+    pub(crate) fn new_of_running_image(
+        &self,
+        tiles: &[Tile],
+        total: u64,
+        image: &[Rgb],
+    ) -> Vec<Result<(u64, Vec<Rgb>), FilmError>> {
+        let width = self.width();
+        let new_of =
+            |&tile: &Tile| self.new_of_running(tile, total, TilePixels::in_image(tile, image, width));
+        tiles.par_iter().map(new_of).collect()
+    }
+
     pub(crate) fn check(&self, tile: usize, pixels: usize) -> Result<Tile, FilmError> {
         if tile >= self.grid.len() {
             return Err(FilmError::Tile(tile, self.grid.len()));

@@ -71,6 +71,33 @@ impl fmt::Debug for SessionError {
     }
 }
 
+/// Adds batches of `spp` samples to a film that is watched, which are the same for any criterion. Those of running means
+/// were `given` in other numbers, and have `growth` times as many samples.
+fn add<'a, 'b>(
+    film: &mut Film,
+    watch: &mut Watch,
+    (spp, growth): (u64, f64),
+    tiles: &[Tile],
+    pixels: &(dyn Fn(Tile) -> TilePixels<'a> + Sync),
+    given: &(dyn Fn(Tile) -> TilePixels<'b> + Sync),
+) -> Result<(), SessionError> {
+    let glances: Vec<_> = tiles.par_iter().map(|&tile| watch.glance(tile, pixels(tile))).collect();
+    let refused = tiles.iter().zip(glances).enumerate().find_map(|(i, (&tile, glance))| {
+        let light = watch.check_light(film, tile, spp, pixels(tile), glance).map_err(SessionError::from);
+        let checked = light.and_then(|()| Ok(film.check_new(tile.index, spp)?));
+        checked.err().map(|error| (i, error))
+    });
+    let (accepted, refused) = match refused {
+        Some((i, error)) => (&tiles[..i], Err(error)),
+        None => (tiles, Ok(())),
+    };
+    let compared = |&tile: &Tile| (tile, watch.compare(film, tile, spp, pixels(tile)));
+    let compared: Vec<_> = accepted.par_iter().map(compared).collect();
+    film.add_tiles(spp, accepted, pixels);
+    watch.see(compared, (spp, growth), pixels, given);
+    refused
+}
+
 /// Film, criterion and limits, for a renderer that owns its main loop: it pushes batches, asks which tiles
 /// are open and how many samples each needs, and ends when none is open.
 ///
@@ -312,34 +339,7 @@ impl<C: StoppingCriterion> Session<C> {
         tiles: &[Tile],
         pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
     ) -> Result<(), SessionError> {
-        self.push_given((spp, 0.0), tiles, &pixels, &pixels)
-    }
-
-    /// The same of batches that the caller has given in other numbers, those of running means, which have `growth` times as
-    /// many samples.
-    fn push_given<'a>(
-        &mut self,
-        (spp, growth): (u64, f64),
-        tiles: &[Tile],
-        pixels: &(impl Fn(Tile) -> TilePixels<'a> + Sync),
-        given: &(impl Fn(Tile) -> TilePixels<'a> + Sync),
-    ) -> Result<(), SessionError> {
-        let (film, watch) = (&mut self.film, &mut self.watch);
-        let glances: Vec<_> = tiles.par_iter().map(|&tile| watch.glance(tile, pixels(tile))).collect();
-        let refused = tiles.iter().zip(glances).enumerate().find_map(|(i, (&tile, glance))| {
-            let light = watch.check_light(film, tile, spp, pixels(tile), glance).map_err(SessionError::from);
-            let checked = light.and_then(|()| Ok(film.check_new(tile.index, spp)?));
-            checked.err().map(|error| (i, error))
-        });
-        let (accepted, refused) = match refused {
-            Some((i, error)) => (&tiles[..i], Err(error)),
-            None => (tiles, Ok(())),
-        };
-        let compared = |&tile: &Tile| (tile, watch.compare(film, tile, spp, pixels(tile)));
-        let compared: Vec<_> = accepted.par_iter().map(compared).collect();
-        film.add_tiles(spp, accepted, pixels);
-        watch.see(compared, (spp, growth), pixels, given);
-        refused
+        add(&mut self.film, &mut self.watch, (spp, 0.0), tiles, &pixels, &pixels)
     }
 
     /// Adds samples that came after their tile had stopped, where they are like those before.
@@ -395,7 +395,8 @@ impl<C: StoppingCriterion> Session<C> {
         let (new, batch) = self.film.new_of_running(place, total, TilePixels::alone(place, mean))?;
         let pixels = |tile| TilePixels::alone(tile, &batch);
         let of = (new, total as f64 / new as f64);
-        self.push_given(of, &[place], &pixels, &|tile| TilePixels::alone(tile, mean))
+        let given = |tile| TilePixels::alone(tile, mean);
+        add(&mut self.film, &mut self.watch, of, &[place], &pixels, &given)
     }
 
     /// Adds the new samples in a running mean of the whole image, row-major, to every open tile: `total` samples per pixel so
@@ -414,10 +415,9 @@ impl<C: StoppingCriterion> Session<C> {
         tiles: &[Tile],
         image: &[Rgb],
     ) -> Result<(), SessionError> {
-        let (film, width) = (&self.film, self.film.width());
-        let new_of =
-            |tile: &Tile| film.new_of_running(*tile, total, TilePixels::in_image(*tile, image, width));
-        let new: Vec<_> = tiles.par_iter().map(new_of).collect();
+        let new = self.film.new_of_running_image(tiles, total, image);
+        let width = self.film.width();
+        let given = |tile| TilePixels::in_image(tile, image, width);
         // Nearly always, all tiles have as many: they are pushed at once then
         let mut rest = tiles.iter().zip(new).peekable();
         while let Some((first, new)) = rest.next() {
@@ -432,7 +432,7 @@ impl<C: StoppingCriterion> Session<C> {
             let place = |tile: &Tile| alike.partition_point(|other| other.index < tile.index);
             let pixels = |tile: Tile| TilePixels::alone(tile, &batches[place(&tile)]);
             let of = (spp, total as f64 / spp as f64);
-            self.push_given(of, &alike, &pixels, &|tile| TilePixels::in_image(tile, image, width))?;
+            add(&mut self.film, &mut self.watch, of, &alike, &pixels, &given)?;
         }
         Ok(())
     }

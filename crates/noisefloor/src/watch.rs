@@ -240,12 +240,12 @@ impl Watch {
 
     /// Takes notice of batches that were added, of tiles in the order of the grid, of what they said before, and of the
     /// numbers that the caller gave: of running means, those are not the batches', and have `growth` times their samples.
-    pub(crate) fn see<'a>(
+    pub(crate) fn see<'a, 'b>(
         &mut self,
         seen: Vec<(Tile, Option<Shift>)>,
         (spp, growth): (u64, f64),
         pixels: impl Fn(Tile) -> TilePixels<'a> + Sync,
-        given: impl Fn(Tile) -> TilePixels<'a> + Sync,
+        given: impl Fn(Tile) -> TilePixels<'b> + Sync,
     ) {
         self.running |= growth > 0.0;
         self.sizes_vary |= seen.iter().any(|(tile, _)| !self.tiles[tile.index].repeats.is_size(spp));
