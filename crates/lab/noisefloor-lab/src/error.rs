@@ -71,8 +71,6 @@ pub enum LabError {
     TooFewImages { scene: String },
     #[error("leaving scenes out needs at least 3 groups of scenes; the corpus has {found}: {names}")]
     TooFewGroups { found: usize, names: String },
-    #[error("a subset of {asked} pairs is too large: at most {most}, half of the {all} pairs that there are")]
-    Subset { asked: usize, most: usize, all: usize },
     /// A result that was written reads back as another one.
     #[error("{}: has been changed since it was written; run again", path.display())]
     Changed { path: PathBuf },

@@ -12,7 +12,6 @@ mod pairs;
 mod protocol;
 mod report;
 mod solver;
-mod subset;
 #[cfg(test)]
 mod tests;
 
@@ -21,7 +20,6 @@ pub use outcome::{Count, Fingerprint, MachineResult, ProtocolOutcome, QueryCost}
 pub use pairs::PairScaling;
 pub use protocol::PairProtocol;
 pub use report::ReproductionReport;
-pub use subset::{PairSubset, subset, write_subset};
 
 use crate::advance::Watch;
 use crate::error::LabError;

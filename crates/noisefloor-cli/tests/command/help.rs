@@ -28,7 +28,7 @@ fn every_command_explains_itself() {
         ("train", "--corpus --table --out --save-table --machine --disagreements"),
         ("evaluate", "--corpus --model --leave-one-scene-out --json --csv --rivals"),
         ("audience", "fit"),
-        ("reproduce", "--corpus --out --edge --levels --dump-subset"),
+        ("reproduce", "--corpus --out --edge --levels"),
         ("study", "stack serve links analyse data simulate backup export erase"),
     ];
     let all = succeed(&["--help"]);

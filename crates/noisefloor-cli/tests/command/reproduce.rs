@@ -94,34 +94,6 @@ fn all_protocols_are_run_and_resumed() {
 }
 
 #[test]
-fn a_subset_is_what_numpy_reads() {
-    let (corpora, folder) = (Corpora::new(), tempdir().unwrap());
-    let mut args = args(&corpora, folder.path());
-    args.extend(["--dump-subset", "50"]);
-    succeed(&args);
-    let machine = json(&folder.path().join("machine.json"));
-    let bytes = std::fs::read(folder.path().join("rows.npy")).unwrap();
-    assert_eq!(bytes[..8], *b"\x93NUMPY\x01\x00");
-    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let said = std::str::from_utf8(&bytes[10..header]).unwrap();
-    assert!(
-        said.contains("'descr': '<f4'") && said.contains("(100, 2048)") && said.ends_with('\n'),
-        "{said}"
-    );
-    assert_eq!((header % 64, bytes.len() - header), (0, 100 * 2048 * 4));
-
-    // The rows and what is said of them belong together: nearly all that is learned is told right
-    let decisions = machine["decisions"].as_array().unwrap();
-    let identical = machine["identical"].as_array().unwrap();
-    assert_eq!((decisions.len(), identical.len(), machine["learned"].as_u64()), (100, 100, Some(50)));
-    let right = decisions[..50]
-        .iter()
-        .zip(identical)
-        .filter(|(d, i)| (d.as_f64() > Some(0.0)) == i.as_bool().unwrap());
-    assert!(right.count() >= 45);
-}
-
-#[test]
 fn what_cannot_be_reproduced_is_named() {
     let (corpora, folder) = (Corpora::new(), tempdir().unwrap());
     let [means, batches] = &corpora.paths;
@@ -134,7 +106,6 @@ fn what_cannot_be_reproduced_is_named() {
     with(&both, &[], &["Attic, zone", "128×128", "64×64"]);
     with(&both, &["--edge", "9"], &["--edge", "16…512"]);
     with(&both, &["--levels", "1000000"], &["--levels", "10…1000"]);
-    with(&both, &["--edge", "16", "--dump-subset", "5000"], &["--dump-subset", "450"]);
     with(&both[..1], &["--edge", "16"], &["3 groups", "Attic, Barn"]);
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();

@@ -3,7 +3,7 @@
 use crate::args::ReproduceArgs;
 use crate::bars::Bars;
 use anyhow::Context;
-use noisefloor_cli::say::{note, print, say};
+use noisefloor_cli::say::{note, print};
 use noisefloor_cli::signals::end_on_signal;
 use noisefloor_image::check_writable;
 use noisefloor_lab::Advance;
@@ -11,24 +11,12 @@ use noisefloor_lab::reproduce::{self, Reproduction, ResultState};
 use std::path::Path;
 
 pub fn run(args: ReproduceArgs) -> anyhow::Result<()> {
-    let ReproduceArgs { corpus, out, edge, levels, dump_subset } = args;
+    let ReproduceArgs { corpus, out, edge, levels } = args;
     let what = Reproduction { corpus, edge, levels };
     // Every result that is there has been written whole, so that there is nothing to save.
     end_on_signal("stopped; finished results are kept, and the same command continues from there")?;
     let bars = Bars::new(false);
     let watch = |advance: Advance<'_>| bars.show(advance);
-    if let Some(count) = dump_subset {
-        let subset = reproduce::subset(&what, count, &watch).context("--dump-subset")?;
-        bars.finish();
-        reproduce::write_subset(&out, &subset)?;
-        say!(
-            "{count} pairs learned in {:.2} s, {} support vectors; rows.npy and machine.json written to {}",
-            subset.seconds_training,
-            subset.support_vectors,
-            out.display()
-        )?;
-        return Ok(());
-    }
     std::fs::create_dir_all(&out)
         .with_context(|| format!("{}: this folder cannot be made", out.display()))?;
     check_writable(out.join("reproduce.json"))?;

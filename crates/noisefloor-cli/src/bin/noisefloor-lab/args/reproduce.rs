@@ -22,8 +22,7 @@ use std::path::PathBuf;
 /// the paper's ray-traced reference.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  noisefloor-lab reproduce --corpus study/lisic9 study/staircase
-  noisefloor-lab reproduce --corpus study/lisic9 study/staircase --dump-subset 1000 --out subset")]
+  noisefloor-lab reproduce --corpus study/lisic9 study/staircase")]
 pub struct ReproduceArgs {
     /// Corpus folders, as for `train`.
     #[arg(long, value_name = "DIR", num_args = 1.., required = true)]
@@ -37,16 +36,8 @@ pub struct ReproduceArgs {
     /// Levels a zone, in equal steps up to its most converged image, 10…1000. The paper has 100.
     #[arg(long, value_name = "N", default_value_t = 75, value_parser = levels)]
     pub levels: usize,
-    /// Instead of all this: learn N of the mask pairs as displayed, and write them (rows.npy) with the
-    /// decision values of N others (machine.json), to compare with other programs.
-    #[arg(long, value_name = "N", value_parser = count)]
-    pub dump_subset: Option<usize>,
 }
 
 fn levels(text: &str) -> Result<usize, String> {
     values::within(text, 10..=1000)
-}
-
-fn count(text: &str) -> Result<usize, String> {
-    values::within(text, 2..=100_000)
 }
