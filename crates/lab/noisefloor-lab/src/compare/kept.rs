@@ -114,7 +114,11 @@ impl Kept {
 
     /// Takes up what the folder has, if it is enough, or of samples that can be told from new ones.
     fn resume(&mut self, job: &ReferenceJob<'_>, repeats: bool) -> Result<(), LabError> {
-        let Some(kept) = self.kept(job)? else { return Ok(()) };
+        let kept = match self.kept(job.folder) {
+            Ok(Some(kept)) => kept,
+            Err(error) if !job.overwrite => return Err(error),
+            _ => return Ok(()),
+        };
         if kept.spp < job.spp && !repeats {
             return Ok(());
         }
@@ -132,14 +136,11 @@ impl Kept {
         Ok(())
     }
 
-    /// What the folder says of its picture; `None` if there is none, or another one that may be overwritten.
-    fn kept(&self, job: &ReferenceJob<'_>) -> Result<Option<Facts>, LabError> {
-        let path = job.folder.join(PICTURE);
-        if job.overwrite && !self.is_like(job.folder) {
-            return Ok(None);
-        }
+    /// What the folder says of its picture; `None` if there is none.
+    fn kept(&self, folder: &Path) -> Result<Option<Facts>, LabError> {
+        let path = folder.join(PICTURE);
         let unlike = || LabError::KeptReference { path: path.clone() };
-        let text = match std::fs::read(job.folder.join(FACTS)) {
+        let text = match std::fs::read(folder.join(FACTS)) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound && !path.exists() => return Ok(None),
             Err(_) => return Err(unlike()),
@@ -158,16 +159,6 @@ impl Kept {
             return Err(unlike());
         }
         Ok(Some(kept))
-    }
-
-    /// Whether the folder keeps this picture.
-    fn is_like(&self, folder: &Path) -> bool {
-        let kept = std::fs::read(folder.join(FACTS)).ok();
-        let kept = kept.and_then(|text| serde_json::from_slice::<Facts>(&text).ok());
-        kept.is_some_and(|kept| {
-            let facts = Facts { spp: kept.spp, digest: kept.digest.clone(), ..self.facts.clone() };
-            facts == kept && digest(&folder.join(PICTURE)).is_ok_and(|digest| digest == kept.digest)
-        })
     }
 
     fn save(&self, folder: &Path) -> Result<(), LabError> {
