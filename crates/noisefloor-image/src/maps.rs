@@ -148,22 +148,14 @@ impl Canvas {
 
     /// Colours one pixel.
     pub fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
-        self.blend(x, y, colour, 1.0);
+        if x < self.width && y < self.height {
+            self.pixels[y * self.width + x] = colour;
+        }
     }
 
     /// Luminance of a pixel as displayed, 0 to 255.
     fn grey(&self, x: usize, y: usize) -> f32 {
         noisefloor::display::luminance(self.pixels[y * self.width + x].map(f32::from))
-    }
-
-    /// Mixes a colour into a pixel; `alpha` is its share, in [0, 1].
-    pub fn blend(&mut self, x: usize, y: usize, colour: [u8; 3], alpha: f64) {
-        if x >= self.width || y >= self.height {
-            return;
-        }
-        for (old, new) in self.pixels[y * self.width + x].iter_mut().zip(colour) {
-            *old = (f64::from(*old) * (1.0 - alpha) + f64::from(new) * alpha).round() as u8;
-        }
     }
 
     /// The canvas as a PNG file in memory.

@@ -18,12 +18,12 @@ mod race;
 pub use denoising::AfterDenoising;
 pub use files::{write_page, write_scene};
 pub use kept::{Converged, ReferenceJob, render_reference};
-pub use outcome::{Comparison, CriterionRun, CurvePoint, Labels, TileStop};
+pub use outcome::{AgainstUniform, Comparison, CriterionRun, Labels, Taken, TileStop};
 pub use page::{page, section};
 pub use pictures::{Crop, Pictures};
-pub use plots::{Cost, Plot, plot};
+pub use plots::{Cost, plot};
 pub use quality::Quality;
-pub use race::Entrant;
+pub use race::{CurvePoint, Entrant};
 
 use crate::advance::Watch;
 use crate::error::LabError;
@@ -74,8 +74,7 @@ pub fn run(
     let mut comparison = Comparison::new(labels, name, &race, &yardstick, &flips)?;
     if let Some(denoiser) = denoiser {
         for (run, entrant) in comparison.runs.iter_mut().zip(&race.entrants) {
-            let after = AfterDenoising::of(&entrant.film().image(), denoiser, &yardstick)?;
-            run.set_denoised(after);
+            run.denoised = Some(AfterDenoising::of(&entrant.film().image(), denoiser, &yardstick)?);
         }
     }
     Ok((comparison, Pictures::new(&seen, &yardstick)))

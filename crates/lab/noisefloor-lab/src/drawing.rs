@@ -1,10 +1,4 @@
-//! What all plots share: colours, signs, and the way onto pixels.
-
-mod pen;
-mod sign;
-
-pub(crate) use pen::Pen;
-pub(crate) use sign::sign;
+//! What all plots share: colours and signs.
 
 use crate::error::LabError;
 use plotters::coord::Shift;
@@ -27,10 +21,27 @@ pub(crate) fn colour(i: usize) -> RGBColor {
     COLOURS[i % COLOURS.len()]
 }
 
+/// The sign of series number `i`, `size` pixels large: a circle, a triangle or a cross.
+pub(crate) fn sign<'a, C: Clone + 'static>(
+    i: usize,
+    at: C,
+    size: i32,
+    colour: RGBColor,
+) -> DynElement<'static, SVGBackend<'a>, C> {
+    match i % 3 {
+        0 => Circle::new(at, size, colour.filled()).into_dyn(),
+        // Its corners a little beyond the circle
+        1 => TriangleMarker::new(at, size + 1, colour).into_dyn(),
+        _ => Cross::new(at, size, colour.stroke_width(size as u32 / 2)).into_dyn(),
+    }
+}
+
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
 /// An SVG plot of that size.
 pub(crate) fn svg(
     size: (u32, u32),
-    draw: impl FnOnce(&DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), LabError>,
+    draw: impl FnOnce(&Area<'_>) -> Result<(), LabError>,
 ) -> Result<String, LabError> {
     let mut text = String::new();
     let root = SVGBackend::with_string(&mut text, size).into_drawing_area();

@@ -1,13 +1,12 @@
 //! Pictures of an evaluation: thresholds of people and of the model over each scene, one against the other,
 //! and the reliability curve.
 
-use crate::drawing::{colour, sign, svg};
+use crate::drawing::{Area, colour, sign, svg};
 use crate::error::LabError;
 use crate::files::{make_folder, write_text};
 use noisefloor::{Rgb, Tile, display::Display};
 use noisefloor_image::maps::{Canvas, ColourScale, TileMark, draw_tiles};
 use noisefloor_learn::{Corpus, CorpusError, Encoding, Prediction, ReliabilityBin, ThresholdRow};
-use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -85,8 +84,8 @@ pub fn write_figures(
     for (scene, map) in map_zones(corpus, predictions)? {
         map.save(folder.join(format!("zones-{scene}.png")))?;
     }
-    write_text(&folder.join("thresholds.svg"), &plot_thresholds(predictions)?)?;
-    write_text(&folder.join("reliability.svg"), &plot_reliability(bins)?)?;
+    write_text(&folder.join("thresholds.svg"), &svg(SIZE, |root| thresholds(root, predictions))?)?;
+    write_text(&folder.join("reliability.svg"), &svg(SIZE, |root| reliability(root, bins))?)?;
     Ok(())
 }
 
@@ -135,17 +134,8 @@ fn blank(zones: &[&Prediction]) -> (Picture, Places) {
 const SIZE: (u32, u32) = (640, 560);
 const LETTERS: (&str, u32) = ("sans-serif", 15);
 
-/// Plots predicted against human thresholds as SVG, with lines at half, once and twice.
-pub(crate) fn plot_thresholds(predictions: &[Prediction]) -> Result<String, LabError> {
-    svg(SIZE, |root| thresholds(root, predictions))
-}
-
-/// Plots observed against predicted probability as SVG; the area of a point is its share of the levels.
-pub(crate) fn plot_reliability(bins: &[ReliabilityBin]) -> Result<String, LabError> {
-    svg(SIZE, |root| reliability(root, bins))
-}
-
-fn thresholds(root: &DrawingArea<SVGBackend<'_>, Shift>, predictions: &[Prediction]) -> Result<(), LabError> {
+/// Predicted against human thresholds, with lines at half, once and twice.
+fn thresholds(root: &Area<'_>, predictions: &[Prediction]) -> Result<(), LabError> {
     let all = predictions.iter().flat_map(|p| [p.human_spp, p.predicted_spp]);
     let (low, high) = all.fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v), h.max(v)));
     let (low, high) = (low.min(high) / 1.3, high * 1.3);
@@ -189,7 +179,8 @@ fn thresholds(root: &DrawingArea<SVGBackend<'_>, Shift>, predictions: &[Predicti
     Ok(())
 }
 
-fn reliability(root: &DrawingArea<SVGBackend<'_>, Shift>, bins: &[ReliabilityBin]) -> Result<(), LabError> {
+/// Observed against predicted probability; the area of a point is its share of the levels.
+fn reliability(root: &Area<'_>, bins: &[ReliabilityBin]) -> Result<(), LabError> {
     let mut chart = ChartBuilder::on(root)
         .margin(12)
         .x_label_area_size(44)

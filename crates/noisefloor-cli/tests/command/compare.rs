@@ -18,8 +18,7 @@ fn a_fixed_number_of_samples_lies_on_the_curve_of_uniform_sampling() {
     let said = succeed(&small(out, &["--criteria", "spp:50,spp:200,oracle,cycles:1"]));
     assert!(said.contains("cornell-box") && said.contains("index.html"), "{said}");
     let scene = folder.path().join("cornell-box");
-    let files =
-        "curve.csv tiles.csv by-samples.svg by-samples.png by-seconds.svg by-seconds.png reference.exr";
+    let files = "curve.csv tiles.csv by-samples.svg by-seconds.svg reference.exr";
     let pictures =
         "reference.json reference.png spp-50.png oracle.png cycles-1.png crop-worst.png crop-disputed.png";
     for file in [words(files), words(pictures)].concat() {
@@ -68,8 +67,7 @@ fn an_oracle_that_renders_by_itself_is_that_of_a_render() {
     let rendered = json(&out.join("report.json"))["samples"].as_f64().unwrap() / 4096.0;
     // The same source, seed and verdicts: the very samples of the render
     assert_eq!(number("spp_mean", 1), rendered, "{:?}", runs("spp_mean"));
-    assert!(number("source_seconds", 1) > 0.0 && number("flip_worst_block", 1) >= number("flip_worst", 1));
-    assert!(number("flip_bad_block", 1) <= number("flip_worst_block", 1));
+    assert!(number("source_seconds", 1) > 0.0);
 }
 
 /// The reference is kept and used again; with more samples wanted, it is rendered on to what one go would

@@ -2,13 +2,23 @@
 
 use super::denoising::{AfterDenoising, DENOISED_LIMIT};
 use super::quality::{Quality, Yardstick};
-use super::race::{Entrant, Race, UniformPoint};
+use super::race::{CurvePoint, Entrant, Race};
 use crate::error::LabError;
 use serde::Serialize;
 
-/// What a criterion took of a scene's run, and what it left: a line of runs.csv.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// What a criterion took of a scene's run, and what it left.
+#[derive(Clone, Debug, PartialEq)]
 pub struct CriterionRun {
+    pub taken: Taken,
+    pub quality: Quality,
+    pub against: AgainstUniform,
+    /// `None` where nothing is denoised.
+    pub denoised: Option<AfterDenoising>,
+}
+
+/// What a criterion took of a scene's run: the first columns of runs.csv.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Taken {
     pub scene: String,
     pub source: String,
     /// The criterion as it was asked for: `cycles:0.01`.
@@ -27,66 +37,23 @@ pub struct CriterionRun {
     /// Seconds in the source for these samples.
     pub source_seconds: f64,
     pub criterion_seconds: f64,
-    /// As in [`Quality`], and so are those that follow.
-    pub rel_mse: f64,
-    /// In dB.
-    pub psnr: f64,
-    pub flip: f64,
-    pub flip_worst: f64,
-    /// Of the worst block of 16×16 pixels.
-    pub flip_worst_block: f64,
-    /// Of the block that one in a hundred is worse than.
-    pub flip_bad_block: f64,
-    /// 3-norm.
-    pub butteraugli: f64,
-    pub butteraugli_worst: f64,
-    pub butteraugli_worst_block: f64,
-    /// JOD.
-    pub cvvdp_jod: f64,
-    /// JOD of the worst tile.
-    pub cvvdp_jod_worst: f64,
-    /// Samples that uniform sampling takes until its worst tile is as good, by FLIP, over those of this
-    /// criterion. `None` if it does not get there.
+}
+
+/// Samples that uniform sampling takes until its worst tile is as good, over those of a criterion. `None` if it does
+/// not get there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AgainstUniform {
+    /// By FLIP.
     pub uniform_over_this: Option<f64>,
     pub uniform_over_this_butteraugli: Option<f64>,
     pub uniform_over_this_cvvdp: Option<f64>,
-    /// The same by FLIP, in seconds of the source, over those of source and criterion.
-    pub uniform_over_this_seconds: Option<f64>,
-    /// In samples, until the worst block is as good by FLIP.
-    pub uniform_over_this_block: Option<f64>,
-    /// Until the block is as good that one in a hundred is worse than.
-    pub uniform_over_this_bad_block: Option<f64>,
-    /// Until the worst block is as good by butteraugli.
-    pub uniform_over_this_block_butteraugli: Option<f64>,
-    /// JOD of the denoised picture. `None`, as those that follow, where nothing is denoised.
-    pub denoised_jod: Option<f64>,
-    /// JOD of its worst tile.
-    pub denoised_jod_worst: Option<f64>,
-    /// Seconds in the source, the criterion and the denoiser, which denoises the final picture once. The denoisings
-    /// of a criterion are among the seconds of the criterion.
-    pub denoised_seconds: Option<f64>,
 }
 
-impl CriterionRun {
-    pub(super) fn set_denoised(&mut self, after: AfterDenoising) {
-        self.denoised_jod = Some(after.jod);
-        self.denoised_jod_worst = Some(after.jod_worst);
-        self.denoised_seconds = Some(self.source_seconds + self.criterion_seconds + after.seconds);
+impl Taken {
+    /// Seconds in source and criterion.
+    pub fn seconds(&self) -> f64 {
+        self.source_seconds + self.criterion_seconds
     }
-}
-
-/// Uniform sampling with that many samples: a line of curve.csv.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct CurvePoint {
-    /// Samples per pixel, everywhere.
-    pub spp: u64,
-    pub source_seconds: f64,
-    /// How far the picture is from the converged one.
-    pub quality: Quality,
-    /// JOD of the worst tile of the denoised picture, where it is denoised.
-    pub denoised_jod_worst: Option<f64>,
-    /// Seconds in the source and the denoiser, which denoises once.
-    pub denoised_seconds: Option<f64>,
 }
 
 /// Where a criterion stopped a tile, and how that tile looks: a line of tiles.csv.
@@ -105,7 +72,7 @@ pub struct TileStop {
 }
 
 /// What came of the criteria on one scene.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     pub scene: String,
     pub source: String,
@@ -144,16 +111,6 @@ impl Comparison {
         let grid = yardstick.grid();
         let run = |entrant: &Entrant| criterion_run(entrant, race, yardstick, &scene, &source);
         let runs = race.entrants.iter().map(run).collect::<Result<_, _>>()?;
-        let point = |&UniformPoint { spp, quality, denoised }: &UniformPoint| {
-            let source_seconds = race.uniform_seconds(spp as f64);
-            CurvePoint {
-                spp,
-                source_seconds,
-                quality,
-                denoised_jod_worst: denoised.map(|after| after.jod_worst),
-                denoised_seconds: denoised.map(|after| source_seconds + after.seconds),
-            }
-        };
         let mut tiles = Vec::new();
         for (entrant, flips) in race.entrants.iter().zip(flips) {
             tiles.extend(grid.tiles().zip(flips).map(|(tile, &flip)| TileStop {
@@ -173,7 +130,7 @@ impl Comparison {
             cancelled: race.cancelled,
             warnings: race.entrants.iter().map(Entrant::warnings).max_by_key(Vec::len).unwrap_or_default(),
             runs,
-            curve: race.curve.iter().map(point).collect(),
+            curve: race.curve.clone(),
             tiles,
             scene: scene.clone(),
         })
@@ -184,7 +141,7 @@ impl Comparison {
     /// Samples per pixel at which uniform sampling is within [`DENOISED_LIMIT`] once it is denoised; `None`
     /// outside its curve, and where nothing is denoised.
     pub(crate) fn uniform_denoised(&self) -> Option<f64> {
-        let points = self.curve.iter().map(|p| Some((p.spp as f64, 10.0 - p.denoised_jod_worst?)));
+        let points = self.curve.iter().map(|p| Some((p.spp as f64, 10.0 - p.denoised?.jod_worst)));
         let points: Vec<(f64, f64)> = points.collect::<Option<_>>()?;
         let (first, lost) = *points.first()?;
         if lost <= DENOISED_LIMIT { Some(first) } else { crossing(&points, DENOISED_LIMIT) }
@@ -202,11 +159,12 @@ fn criterion_run(
     let grid = film.grid();
     let spp_mean = film.total_samples() as f64 / (grid.width() * grid.height()) as f64;
     let quality = yardstick.quality(&film.image())?;
-    let uniform = |error: fn(&Quality) -> f64| uniform_samples(race, error, error(&quality));
-    let over = |error| uniform(error).map(|spp| spp / spp_mean);
-    let (source_seconds, criterion_seconds) = (race.source_seconds(entrant), entrant.criterion_seconds);
-    let in_seconds = |spp| race.uniform_seconds(spp) / (source_seconds + criterion_seconds);
-    Ok(CriterionRun {
+    // Between points of the curve
+    let over = |error: fn(&Quality) -> f64| {
+        let points = race.curve.iter().map(|point| (point.spp as f64, error(&point.quality)));
+        Some(crossing(&points.collect::<Vec<_>>(), error(&quality))? / spp_mean)
+    };
+    let taken = Taken {
         scene: scene.into(),
         source: source.into(),
         criterion: entrant.spec.clone(),
@@ -216,41 +174,18 @@ fn criterion_run(
         spp_most: (0..grid.len()).map(|t| film.spp(t)).max().unwrap_or(0),
         tiles: grid.len(),
         tiles_converged: entrant.converged(),
-        source_seconds,
-        criterion_seconds,
-        rel_mse: quality.rel_mse,
-        psnr: quality.psnr,
-        flip: quality.flip,
-        flip_worst: quality.flip_worst,
-        flip_worst_block: quality.flip_worst_block,
-        flip_bad_block: quality.flip_bad_block,
-        butteraugli: quality.butteraugli,
-        butteraugli_worst: quality.butteraugli_worst,
-        butteraugli_worst_block: quality.butteraugli_worst_block,
-        cvvdp_jod: quality.cvvdp_jod,
-        cvvdp_jod_worst: quality.cvvdp_jod_worst,
+        source_seconds: race.source_seconds(entrant),
+        criterion_seconds: entrant.criterion_seconds,
+    };
+    let against = AgainstUniform {
         uniform_over_this: over(|q| q.flip_worst),
         uniform_over_this_butteraugli: over(|q| q.butteraugli_worst),
         uniform_over_this_cvvdp: over(|q| 10.0 - q.cvvdp_jod_worst),
-        uniform_over_this_seconds: uniform(|q| q.flip_worst).map(in_seconds),
-        uniform_over_this_block: over(|q| q.flip_worst_block),
-        uniform_over_this_bad_block: over(|q| q.flip_bad_block),
-        uniform_over_this_block_butteraugli: over(|q| q.butteraugli_worst_block),
-        denoised_jod: None,
-        denoised_jod_worst: None,
-        denoised_seconds: None,
-    })
+    };
+    Ok(CriterionRun { taken, quality, against, denoised: None })
 }
 
-/// Samples per pixel at which uniform sampling is as good, between points of its curve along a straight
-/// line in logarithms; `None` outside the curve.
-fn uniform_samples(race: &Race, error: fn(&Quality) -> f64, wanted: f64) -> Option<f64> {
-    let points: Vec<(f64, f64)> =
-        race.curve.iter().map(|point| (point.spp as f64, error(&point.quality))).collect();
-    crossing(&points, wanted)
-}
-
-/// Where a falling curve first comes down to a value.
+/// Where a falling curve first comes down to a value, along straight lines in logarithms; `None` outside the curve.
 fn crossing(points: &[(f64, f64)], wanted: f64) -> Option<f64> {
     points.windows(2).find_map(|pair| {
         let [(x0, y0), (x1, y1)] = [pair[0], pair[1]];
@@ -264,9 +199,9 @@ fn crossing(points: &[(f64, f64)], wanted: f64) -> Option<f64> {
 /// Names of the families, each once, in the order of the entrants.
 pub(super) fn families(runs: &[CriterionRun]) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
-    for run in runs {
-        if !names.contains(&run.family.as_str()) {
-            names.push(&run.family);
+    for Taken { family, .. } in runs.iter().map(|run| &run.taken) {
+        if !names.contains(&family.as_str()) {
+            names.push(family);
         }
     }
     names

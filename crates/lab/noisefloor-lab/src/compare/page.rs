@@ -1,14 +1,13 @@
 //! One page with all of it, that opens without a server and can be sent by mail: pictures and plots are in
 //! it.
 
-use super::denoising::DENOISED_LIMIT;
+use super::denoising::{AfterDenoising, DENOISED_LIMIT};
 use super::outcome::{Comparison, CriterionRun, families};
 use super::pictures::{Pictures, WORST_FLIP};
-use super::plots::{Cost, Plot, short};
+use super::plots::{Cost, short};
 use crate::error::LabError;
 use base64::Engine;
 use noisefloor_image::maps::Canvas;
-use std::fmt::Write;
 
 const STYLE: &str = "
   :root { color-scheme: light; }
@@ -37,15 +36,11 @@ pub fn page(all: &[Comparison], sections: &[String], scenes: usize) -> String {
     );
     if all.len() < scenes {
         let done = all.len();
-        put(
-            &mut html,
-            format_args!(
-                "<p><b>Not finished:</b> {done} of {scenes} scenes have been compared so far.</p>\n"
-            ),
-        );
+        html +=
+            &format!("<p><b>Not finished:</b> {done} of {scenes} scenes have been compared so far.</p>\n");
     }
     if all.len() > 1 {
-        html.push_str(&summary(all));
+        html += &summary(all);
     }
     sections.iter().for_each(|section| html.push_str(section));
     html.push_str("</body></html>\n");
@@ -58,18 +53,18 @@ fn summary(all: &[Comparison]) -> String {
                     <thead><tr><th>criterion</th>"
         .to_owned();
     for comparison in all {
-        put(&mut html, format_args!("<th>{}</th>", escape(&comparison.scene)));
+        html += &format!("<th>{}</th>", escape(&comparison.scene));
     }
     html.push_str("</tr></thead><tbody>\n");
     let first = all.first().map(|c| c.runs.as_slice()).unwrap_or_default();
     for family in families(first) {
-        put(&mut html, format_args!("<tr{}><td>{}</td>", mark(family), escape(family)));
+        html += &format!("<tr{}><td>{}</td>", mark(family), escape(family));
         for comparison in all {
-            let run = comparison.runs.iter().find(|run| run.family == family);
-            let flip = ratio(run.and_then(|run| run.uniform_over_this));
-            let butteraugli = ratio(run.and_then(|run| run.uniform_over_this_butteraugli));
-            let jod = ratio(run.and_then(|run| run.uniform_over_this_cvvdp));
-            put(&mut html, format_args!("<td>{flip} ({butteraugli}, {jod})</td>"));
+            let run = comparison.runs.iter().find(|run| run.taken.family == family);
+            let flip = ratio(run.and_then(|run| run.against.uniform_over_this));
+            let butteraugli = ratio(run.and_then(|run| run.against.uniform_over_this_butteraugli));
+            let jod = ratio(run.and_then(|run| run.against.uniform_over_this_cvvdp));
+            html += &format!("<td>{flip} ({butteraugli}, {jod})</td>");
         }
         html.push_str("</tr>\n");
     }
@@ -81,36 +76,33 @@ fn summary(all: &[Comparison]) -> String {
 pub fn section(
     comparison: &Comparison,
     pictures: &Pictures,
-    plots: &[(Cost, Plot)],
+    plots: &[(Cost, String)],
 ) -> Result<String, LabError> {
     let mut html = table(comparison);
-    html.push_str(&denoised_table(comparison));
+    html += &denoised_table(comparison);
     for (cost, plot) in plots {
         let caption = match cost {
             Cost::Samples => "Error against samples per pixel; each sign is where a criterion stopped.",
             Cost::Seconds => "Error against seconds, of the source and the criterion together.",
         };
-        let svg = &plot.svg;
-        put(&mut html, format_args!("<figure>{svg}<figcaption>{caption}</figcaption></figure>\n"));
+        html += &format!("<figure>{plot}<figcaption>{caption}</figcaption></figure>\n");
     }
     for crop in &pictures.crops {
         let (image, caption) = (data_uri(&crop.sheet)?, escape(&crop.caption));
-        put(
-            &mut html,
-            format_args!(
-                "<figure><div class=\"wide\"><img src=\"{image}\" alt=\"{caption}\"></div><figcaption>{caption} Below: FLIP error, black \
+        html += &format!(
+            "<figure><div class=\"wide\"><img src=\"{image}\" alt=\"{caption}\"></div><figcaption>{caption} Below: FLIP error, black \
                  to yellow for 0 to {WORST_FLIP}.</figcaption></figure>\n"
-            ),
         );
     }
     html.push_str("<div class=\"pictures\">\n");
     html.push_str(&figure(&pictures.reference, "reference")?);
     for family in families(&comparison.runs) {
-        let Some(run) = comparison.runs.iter().find(|run| run.family == family) else { continue };
-        let Some((_, canvas)) = pictures.criteria.iter().find(|(spec, _)| *spec == run.criterion) else {
+        let Some(run) = comparison.runs.iter().find(|run| run.taken.family == family) else { continue };
+        let Some((_, canvas)) = pictures.criteria.iter().find(|(spec, _)| *spec == run.taken.criterion)
+        else {
             continue;
         };
-        html.push_str(&figure(canvas, &format!("{}: {:.0} spp", run.criterion, run.spp_mean))?);
+        html += &figure(canvas, &format!("{}: {:.0} spp", run.taken.criterion, run.taken.spp_mean))?;
     }
     html.push_str("</div>\n");
     Ok(html)
@@ -150,45 +142,39 @@ fn denoised_table(comparison: &Comparison) -> String {
             .uniform_denoised()
             .map_or_else(|| "no measured number of".to_owned(), |spp| format!("{spp:.0}"))
     );
-    for run in &comparison.runs {
-        let (Some(jod), Some(worst), Some(seconds)) =
-            (run.denoised_jod, run.denoised_jod_worst, run.denoised_seconds)
-        else {
-            return String::new();
-        };
+    for CriterionRun { taken, denoised, .. } in &comparison.runs {
+        let Some(AfterDenoising { seconds, jod, jod_worst: worst }) = *denoised else { return String::new() };
         let within = if 10.0 - worst <= DENOISED_LIMIT { "yes" } else { "no" };
-        let (criterion, spp, seconds) = (escape(&run.criterion), run.spp_mean, short(seconds));
-        put(
-            &mut html,
-            format_args!(
-                "<tr{}><td>{criterion}</td><td>{spp:.0}</td><td>{seconds}</td><td>{jod:.3}</td><td>{worst:.3}</td><td>{within}</td></tr>\n",
-                mark(&run.family)
-            ),
+        let (criterion, spp) = (escape(&taken.criterion), taken.spp_mean);
+        let seconds = short(taken.seconds() + seconds);
+        html += &format!(
+            "<tr{}><td>{criterion}</td><td>{spp:.0}</td><td>{seconds}</td><td>{jod:.3}</td><td>{worst:.3}</td><td>{within}</td></tr>\n",
+            mark(&taken.family)
         );
     }
     html + "</tbody></table></div>\n"
 }
 
-fn row(run: &CriterionRun) -> String {
+fn row(CriterionRun { taken, quality, against, .. }: &CriterionRun) -> String {
     let cells = [
-        format!("{:.0}", run.spp_mean),
-        run.spp_most.to_string(),
-        format!("{} of {}", run.tiles_converged, run.tiles),
-        short(run.source_seconds),
-        short(run.criterion_seconds),
-        short(run.rel_mse),
-        format!("{:.1}", run.psnr),
-        short(run.flip),
-        short(run.flip_worst),
-        format!("{:.3}", run.cvvdp_jod),
-        format!("{:.3}", run.cvvdp_jod_worst),
-        short(run.butteraugli),
-        short(run.butteraugli_worst),
-        ratio(run.uniform_over_this),
+        format!("{:.0}", taken.spp_mean),
+        taken.spp_most.to_string(),
+        format!("{} of {}", taken.tiles_converged, taken.tiles),
+        short(taken.source_seconds),
+        short(taken.criterion_seconds),
+        short(quality.rel_mse),
+        format!("{:.1}", quality.psnr),
+        short(quality.flip),
+        short(quality.flip_worst),
+        format!("{:.3}", quality.cvvdp_jod),
+        format!("{:.3}", quality.cvvdp_jod_worst),
+        short(quality.butteraugli),
+        short(quality.butteraugli_worst),
+        ratio(against.uniform_over_this),
     ];
     let cells = cells.map(|cell| format!("<td>{cell}</td>")).concat();
-    let (name, criterion) = (escape(&run.name), escape(&run.criterion));
-    format!("<tr{}><td title=\"{name}\">{criterion}</td>{cells}</tr>\n", mark(&run.family))
+    let (name, criterion) = (escape(&taken.name), escape(&taken.criterion));
+    format!("<tr{}><td title=\"{name}\">{criterion}</td>{cells}</tr>\n", mark(&taken.family))
 }
 
 fn figure(canvas: &Canvas, caption: &str) -> Result<String, LabError> {
@@ -196,11 +182,6 @@ fn figure(canvas: &Canvas, caption: &str) -> Result<String, LabError> {
     Ok(format!(
         "<figure><img src=\"{image}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>\n"
     ))
-}
-
-fn put(html: &mut String, text: std::fmt::Arguments<'_>) {
-    // Memory does not fail to be written to
-    let _ = html.write_fmt(text);
 }
 
 fn mark(family: &str) -> &'static str {

@@ -1,7 +1,7 @@
 //! How far a picture is from the converged one.
 
 use crate::error::LabError;
-use noisefloor::{Rgb, Tile, TileGrid, display::Display, tile::MIN_TILE};
+use noisefloor::{Rgb, Tile, TileGrid, display::Display};
 use noisefloor_rivals::{MetricError, metrics};
 use noisefloor_vision::{VisionModel, VisionWorkspace};
 use serde::Serialize;
@@ -17,16 +17,10 @@ pub struct Quality {
     pub flip: f64,
     /// Mean FLIP error of the worst tile.
     pub flip_worst: f64,
-    /// Mean FLIP error of the worst block of 16×16 pixels.
-    pub flip_worst_block: f64,
-    /// Mean FLIP error of the block that one in a hundred is worse than.
-    pub flip_bad_block: f64,
     /// Butteraugli, 3-norm.
     pub butteraugli: f64,
     /// Butteraugli, 3-norm, of the worst tile.
     pub butteraugli_worst: f64,
-    /// Butteraugli, 3-norm, of the worst block.
-    pub butteraugli_worst_block: f64,
     /// ColorVideoVDP: just-objectionable differences (JOD), of at most 10.
     pub cvvdp_jod: f64,
     /// ColorVideoVDP of the worst tile, each compared as a picture of its own.
@@ -41,7 +35,6 @@ pub(super) struct Eye {
 /// The converged picture, and how it is looked at.
 pub(super) struct Yardstick {
     grid: TileGrid,
-    blocks: TileGrid,
     display: Display,
     linear: Vec<Rgb>,
     shown: Vec<Rgb>,
@@ -61,15 +54,9 @@ fn mean(values: &mut dyn Iterator<Item = f32>) -> f64 {
 
 impl Yardstick {
     /// `reference` is linear radiance, row-major over the image of `grid`.
-    pub(super) fn new(
-        grid: TileGrid,
-        display: Display,
-        reference: Vec<Rgb>,
-        eye: Eye,
-    ) -> Result<Self, LabError> {
+    pub(super) fn new(grid: TileGrid, display: Display, reference: Vec<Rgb>, eye: Eye) -> Self {
         let shown = reference.iter().map(|&p| display.encode(p)).collect();
-        let blocks = TileGrid::new(grid.width(), grid.height(), MIN_TILE)?;
-        Ok(Self { grid, blocks, display, linear: reference, shown, eye })
+        Self { grid, display, linear: reference, shown, eye }
     }
 
     pub(super) fn grid(&self) -> TileGrid {
@@ -94,7 +81,7 @@ impl Yardstick {
 
     /// Mean over each tile of the FLIP errors of the pixels.
     pub(super) fn flip_of_tiles(&self, errors: &[f32]) -> Vec<f64> {
-        pooled(self.grid, errors, mean)
+        self.pooled(errors, mean)
     }
 
     /// All distances of a picture of linear radiance.
@@ -106,18 +93,13 @@ impl Yardstick {
         let (flip, butteraugli) = (flip?, butteraugli?.values);
         let (cvvdp_jod, jods) = self.jods(&shown)?;
         let worst = |places: &[f64]| places.iter().copied().fold(0.0, f64::max);
-        let mut flips = pooled(self.blocks, &flip, mean);
-        flips.sort_by(f64::total_cmp);
         Ok(Quality {
             rel_mse: metrics::relative_mse(image, &self.linear)?,
             psnr: metrics::psnr(&shown, &self.shown)?,
             flip: mean(&mut flip.iter().copied()),
-            flip_worst: worst(&pooled(self.grid, &flip, mean)),
-            flip_worst_block: worst(&flips),
-            flip_bad_block: flips[flips.len() * 99 / 100],
+            flip_worst: worst(&self.pooled(&flip, mean)),
             butteraugli: norm3(&mut butteraugli.iter().copied()),
-            butteraugli_worst: worst(&pooled(self.grid, &butteraugli, norm3)),
-            butteraugli_worst_block: worst(&pooled(self.blocks, &butteraugli, norm3)),
+            butteraugli_worst: worst(&self.pooled(&butteraugli, norm3)),
             cvvdp_jod,
             cvvdp_jod_worst: jods.into_iter().fold(10.0, f64::min),
         })
@@ -132,10 +114,11 @@ impl Yardstick {
         let whole = vision.compare(shown, &self.shown, size, &mut workspace).map_err(MetricError::from)?;
         Ok((whole.jod(), jods))
     }
-}
 
-/// Values of pixels, pooled over each cell of a grid.
-fn pooled(grid: TileGrid, values: &[f32], pool: fn(&mut dyn Iterator<Item = f32>) -> f64) -> Vec<f64> {
-    let pool_cell = |cell: Tile| pool(&mut cell.rows(grid.width()).flatten().map(|pixel| values[pixel]));
-    grid.tiles().map(pool_cell).collect()
+    /// Values of pixels, pooled over each tile.
+    fn pooled(&self, values: &[f32], pool: fn(&mut dyn Iterator<Item = f32>) -> f64) -> Vec<f64> {
+        let width = self.grid.width();
+        let pool_tile = |tile: Tile| pool(&mut tile.rows(width).flatten().map(|pixel| values[pixel]));
+        self.grid.tiles().map(pool_tile).collect()
+    }
 }

@@ -96,8 +96,8 @@ impl Entrant {
 
 pub(super) struct Race {
     pub(super) entrants: Vec<Entrant>,
-    /// Uniform sampling: samples per pixel, and how far the picture then is from the converged one.
-    pub(super) curve: Vec<UniformPoint>,
+    /// Uniform sampling, by increasing samples.
+    pub(super) curve: Vec<CurvePoint>,
     /// Seconds that one more sample of each pixel of a tile costs, tile by tile.
     pub(super) tile_seconds: Vec<f64>,
     pub(super) cancelled: bool,
@@ -113,22 +113,22 @@ impl Race {
         let costs = self.tile_seconds.iter().enumerate();
         costs.map(|(tile, seconds)| seconds * entrant.film().spp(tile) as f64).sum()
     }
-
-    /// Seconds in the source for this many samples of every pixel.
-    pub(super) fn uniform_seconds(&self, spp: f64) -> f64 {
-        self.tile_seconds.iter().sum::<f64>() * spp
-    }
 }
 
-/// Uniform sampling, somewhere along its way.
-pub(super) struct UniformPoint {
-    pub(super) spp: u64,
-    pub(super) quality: Quality,
+/// Uniform sampling with that many samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurvePoint {
+    /// Samples per pixel, everywhere.
+    pub spp: u64,
+    pub source_seconds: f64,
+    /// How far the picture is from the converged one.
+    pub quality: Quality,
     /// With a denoiser only.
-    pub(super) denoised: Option<AfterDenoising>,
+    pub denoised: Option<AfterDenoising>,
 }
 
-impl UniformPoint {
+impl CurvePoint {
+    /// Its seconds are known at the end of the run.
     fn new(
         film: &Film,
         yardstick: &Yardstick,
@@ -139,7 +139,7 @@ impl UniformPoint {
             Some(denoiser) => Some(AfterDenoising::of(&image, *denoiser, yardstick)?),
             None => None,
         };
-        Ok(Self { spp: film.spp(0), quality: yardstick.quality(&image)?, denoised })
+        Ok(Self { spp: film.spp(0), source_seconds: 0.0, quality: yardstick.quality(&image)?, denoised })
     }
 }
 
@@ -182,7 +182,7 @@ impl Course<'_> {
         };
         field.show_converged(self.truth)?;
         let mut yardstick: Option<Yardstick> = None;
-        let mut curve: Vec<UniformPoint> = Vec::new();
+        let mut curve: Vec<CurvePoint> = Vec::new();
         let (mut done, mut cancelled) = (0u64, false);
         while done < self.params.max_spp && field.open() > 0 {
             cancelled = self.cancel.load(Ordering::Relaxed);
@@ -202,7 +202,7 @@ impl Course<'_> {
             }
             let last = curve.last().map_or(0.0, |point| point.spp as f64);
             if done as f64 >= SPACING * last {
-                curve.push(UniformPoint::new(&field.film, yardstick, denoiser)?);
+                curve.push(CurvePoint::new(&field.film, yardstick, denoiser)?);
             }
             let detail = format!("{} criteria not satisfied yet", field.open());
             let (what, of) = ("samples per pixel", self.params.max_spp);
@@ -217,9 +217,11 @@ impl Course<'_> {
         }
         let yardstick = yardstick.ok_or(LabError::NoSamples)?;
         if curve.last().is_none_or(|point| point.spp < done) {
-            curve.push(UniformPoint::new(&film, &yardstick, denoiser)?);
+            curve.push(CurvePoint::new(&film, &yardstick, denoiser)?);
         }
         let tile_seconds = costs.tile_seconds(&grid.tiles().collect::<Vec<_>>());
+        let everywhere: f64 = tile_seconds.iter().sum();
+        curve.iter_mut().for_each(|point| point.source_seconds = everywhere * point.spp as f64);
         Ok((Race { entrants, curve, tile_seconds, cancelled }, yardstick))
     }
 
@@ -228,7 +230,7 @@ impl Course<'_> {
         let display = self.params.tone_mapping.settle(self.truth);
         field.entrants.iter_mut().try_for_each(|e| e.session.set_display(display.clone()))?;
         let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision: self.vision.clone() };
-        Yardstick::new(field.film.grid(), display, self.truth.to_vec(), eye)
+        Ok(Yardstick::new(field.film.grid(), display, self.truth.to_vec(), eye))
     }
 }
 

@@ -1,10 +1,9 @@
 //! Mean thresholds, scene by scene.
 
 use super::{RatedRival, scene_means};
-use crate::drawing::{colour, sign, svg};
+use crate::drawing::{Area, colour, sign, svg};
 use crate::error::LabError;
 use noisefloor_learn::Prediction;
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 /// Where the legend of the plot begins, in pixels.
@@ -34,11 +33,7 @@ fn series<'a>(model: &[Prediction], rated: &'a [RatedRival]) -> (Vec<String>, Ve
     (of_model.into_iter().map(|s| s.scene).collect(), series)
 }
 
-fn draw(
-    root: &DrawingArea<SVGBackend<'_>, Shift>,
-    scenes: &[String],
-    series: &[Series<'_>],
-) -> Result<(), LabError> {
+fn draw(root: &Area<'_>, scenes: &[String], series: &[Series<'_>]) -> Result<(), LabError> {
     let all = || series.iter().flat_map(|s| &s.1).copied().filter(|v| v.is_finite());
     let (low, high) = all().fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v), h.max(v)));
     let letters = ("sans-serif", 14);

@@ -12,7 +12,8 @@ use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::sources::{Opened, Resources, SourceJob};
 use noisefloor_denoise::Denoiser;
 use noisefloor_lab::compare::{
-    self, Comparison, Converged, Cost, Entrant, Labels, ReferenceJob, Setting, render_reference,
+    self, AfterDenoising, Comparison, Converged, Cost, CriterionRun, Entrant, Labels, ReferenceJob, Setting,
+    render_reference,
 };
 use noisefloor_lab::{Advance, LabError};
 use std::collections::HashSet;
@@ -180,26 +181,25 @@ fn say_runs(compared: &Comparison) -> Result<(), NotSaid> {
         "worst",
         "butter."
     )?;
-    for run in &compared.runs {
+    for CriterionRun { taken, quality, against, denoised } in &compared.runs {
         say!(
             "{:24} {:8.0} {:6} {:>9} {:9.2} {:9.3}  {:7.5} {:7.4} {:7.4} {:6.3} {:6.3} {:7.3}  {}",
-            run.criterion,
-            run.spp_mean,
-            run.spp_most,
-            format!("{}/{}", run.tiles_converged, run.tiles),
-            run.source_seconds,
-            run.criterion_seconds,
-            run.rel_mse,
-            run.flip,
-            run.flip_worst,
-            run.cvvdp_jod,
-            run.cvvdp_jod_worst,
-            run.butteraugli_worst,
-            run.uniform_over_this.map_or_else(|| "–".to_owned(), |ratio| format!("×{ratio:.2}")),
+            taken.criterion,
+            taken.spp_mean,
+            taken.spp_most,
+            format!("{}/{}", taken.tiles_converged, taken.tiles),
+            taken.source_seconds,
+            taken.criterion_seconds,
+            quality.rel_mse,
+            quality.flip,
+            quality.flip_worst,
+            quality.cvvdp_jod,
+            quality.cvvdp_jod_worst,
+            quality.butteraugli_worst,
+            against.uniform_over_this.map_or_else(|| "–".to_owned(), |ratio| format!("×{ratio:.2}")),
         )?;
-        if let (Some(jod), Some(worst), Some(seconds)) =
-            (run.denoised_jod, run.denoised_jod_worst, run.denoised_seconds)
-        {
+        if let Some(AfterDenoising { seconds, jod, jod_worst: worst }) = denoised {
+            let seconds = taken.seconds() + seconds;
             say!("{:24} denoised: JOD {jod:.3}, worst tile {worst:.3}, {seconds:.2} s in all", "")?;
         }
     }

@@ -39,7 +39,7 @@ use std::time::Duration;
 /// do. With spaced verdicts it renders by itself, from the same source and seed.
 ///
 /// Writes into the output folder: index.html with everything (one file that opens without a server),
-/// runs.csv, runs.json, and for each scene curve.csv, tiles.csv, plots (SVG and PNG), crops with error
+/// runs.csv, and for each scene curve.csv, tiles.csv, plots, crops with error
 /// maps, the picture of every criterion, and the reference, which the next comparison of the same scene
 /// uses again (--force).
 #[derive(Debug, Args)]
