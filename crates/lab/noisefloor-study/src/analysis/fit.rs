@@ -77,25 +77,35 @@ impl Hypothesis {
         self.median + self.width * self.shape.to_level95
     }
 
-    /// Logarithm of the likelihood of observations, each with a weight.
-    fn ln_likelihood(&self, observations: &[(Observation, f64)]) -> f64 {
-        let mut sum = 0.0;
+    /// Likelihood of each observation without slips.
+    fn likelihoods(&self, observations: &[(Observation, f64)]) -> Vec<f64> {
         // Measurements of one tile share their values: the shares between them are computed once
         let mut bins: (f64, f64, Vec<f64>) = (0.0, 0.0, Vec::new());
-        for (observation, weight) in observations {
+        let likelihood = |(observation, _): &(Observation, f64)| match observation {
+            &Observation::Between { above, to, .. } => {
+                to.map_or(1.0, |x| self.share(x)) - above.map_or(0.0, |x| self.share(x))
+            }
+            Observation::Measured(known) => {
+                if (bins.0, bins.1, bins.2.len()) != (known.low, known.step, known.weights.len()) {
+                    let edge = |i: usize| self.share(known.low + known.step * (i as f64 - 0.5));
+                    let edges: Vec<f64> = (0..=known.weights.len()).map(edge).collect();
+                    bins = (known.low, known.step, edges.windows(2).map(|e| e[1] - e[0]).collect());
+                }
+                known.weights.iter().zip(&bins.2).map(|(w, b)| w * b).sum()
+            }
+        };
+        observations.iter().map(likelihood).collect()
+    }
+
+    /// Logarithm of the likelihood of observations, each with a weight, from those without slips.
+    fn ln_likelihood(&self, observations: &[(Observation, f64)], without_slips: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for ((observation, weight), &inside) in observations.iter().zip(without_slips) {
             let likelihood = match observation {
-                &Observation::Between { above, to, levels } => {
-                    let inside = to.map_or(1.0, |x| self.share(x)) - above.map_or(0.0, |x| self.share(x));
-                    (1.0 - self.slips) * inside + self.slips / levels as f64
+                Observation::Between { levels, .. } => {
+                    (1.0 - self.slips) * inside + self.slips / *levels as f64
                 }
-                Observation::Measured(known) => {
-                    if (bins.0, bins.1, bins.2.len()) != (known.low, known.step, known.weights.len()) {
-                        let edge = |i: usize| self.share(known.low + known.step * (i as f64 - 0.5));
-                        let edges: Vec<f64> = (0..=known.weights.len()).map(edge).collect();
-                        bins = (known.low, known.step, edges.windows(2).map(|e| e[1] - e[0]).collect());
-                    }
-                    known.weights.iter().zip(&bins.2).map(|(w, b)| w * b).sum()
-                }
+                Observation::Measured(_) => inside,
             };
             sum += weight * likelihood.max(1e-12).ln();
         }
@@ -204,14 +214,12 @@ fn posterior(
     for shape in SHAPES.iter() {
         for width in 0..counts[1] {
             for median in 0..counts[0] {
+                let width = at(ln_widths, width, counts[1]).exp();
+                let of = |slips| Hypothesis { median: at(medians, median, counts[0]), width, shape, slips };
+                let without_slips = of(0.0).likelihoods(observations);
                 for &slips in slips {
-                    let hypothesis = Hypothesis {
-                        median: at(medians, median, counts[0]),
-                        width: at(ln_widths, width, counts[1]).exp(),
-                        shape,
-                        slips,
-                    };
-                    all.push((shape.ln_prior + hypothesis.ln_likelihood(observations), hypothesis));
+                    let ln_likelihood = of(slips).ln_likelihood(observations, &without_slips);
+                    all.push((shape.ln_prior + ln_likelihood, of(slips)));
                 }
             }
         }
