@@ -50,7 +50,6 @@ impl StudyServer {
         exposure: &Exposure,
     ) -> Result<Self, StudyError> {
         let store = AnswerStore::open(&study.database, &study.design())?;
-        store.keep_plans(Arc::clone(&study)).await?;
         let listening = Listening::bind(address, exposure).await?;
         let app = Arc::new(App {
             grids: session::grids(&study),

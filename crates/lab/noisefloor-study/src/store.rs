@@ -15,4 +15,4 @@ pub use offline::{back_up, erase_one, make_links, read_all, read_one};
 pub use record::{NewSession, SessionRecord};
 pub use writer::AnswerStore;
 
-pub(crate) use database::{now_ms, settle};
+pub(crate) use database::{Kind, Mode, now_ms};

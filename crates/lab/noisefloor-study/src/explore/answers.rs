@@ -2,22 +2,23 @@
 //! `synchronous = FULL` in a write-ahead log.
 
 use crate::error::StoreError;
-use crate::store::{now_ms, settle};
+use crate::store::{Kind, Mode, now_ms};
 use noisefloor::{
     descriptor::{Descriptor, DescriptorSpec},
     evidence::Evidence,
 };
 use noisefloor_learn::Answer;
-use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, params};
+use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// `PRAGMA application_id`: "nfex".
-const APPLICATION: i32 = 0x6e66_6578;
-/// `PRAGMA user_version`: of the table below.
-const VERSION: i32 = 1;
-const TABLES: &str = "
+/// Disagreements: "nfex".
+const DISAGREEMENTS: Kind = Kind {
+    application: 0x6e66_6578,
+    version: 1,
+    other: || StoreError::NotDisagreements,
+    tables: "
 CREATE TABLE IF NOT EXISTS disagreements (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     picture TEXT NOT NULL, name TEXT NOT NULL, scene TEXT NOT NULL, spp REAL NOT NULL,
@@ -28,9 +29,8 @@ CREATE TABLE IF NOT EXISTS disagreements (
     descriptor TEXT NOT NULL, descriptor_version INTEGER NOT NULL, evidence TEXT NOT NULL,
     numbers TEXT NOT NULL,
     UNIQUE (picture, x, y, width, height)
-) STRICT;";
-const COLUMNS: &str = "id, picture, name, scene, spp, x, y, width, height, sees_noise, at_ms, probability, \
-    threshold, slope, offset, model, descriptor, descriptor_version, evidence, numbers";
+) STRICT;",
+};
 
 /// What somebody said about a tile, and what the model had said.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -93,7 +93,7 @@ impl Disagreements {
     /// Opens the database, creating it if needed.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, StoreError> {
         let path = path.as_ref().to_owned();
-        let connection = prepare(&path).map_err(|fault| fault.at(&path))?;
+        let connection = DISAGREEMENTS.open(&path, Mode::Create).map_err(|fault| fault.at(&path))?;
         Ok(Self { path, connection: Mutex::new(connection) })
     }
 
@@ -167,38 +167,15 @@ impl Disagreements {
     }
 }
 
-fn prepare(path: &Path) -> Result<Connection, StoreError> {
-    let connection = Connection::open(path)?;
-    let tables: i64 = connection.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))?;
-    if tables > 0 {
-        check(&connection)?;
-    }
-    settle(&connection)?;
-    connection.pragma_update(None, "application_id", APPLICATION)?;
-    connection.pragma_update(None, "user_version", VERSION)?;
-    connection.execute_batch(TABLES)?;
-    Ok(connection)
-}
-
 /// All disagreements of a database, oldest first. The database may be in use.
 pub fn read_answers(path: impl AsRef<Path>) -> Result<Vec<Disagreement>, StoreError> {
-    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let found = || {
-        let connection = Connection::open_with_flags(&path, flags)?;
-        check(&connection)?;
-        Ok(read(&connection)?)
-    };
-    found().map_err(|fault: StoreError| fault.at(path.as_ref()))
-}
-
-fn check(connection: &Connection) -> Result<(), StoreError> {
-    let pragma = |name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i32>(0));
-    let found = (pragma("application_id")?, pragma("user_version")?);
-    if found == (APPLICATION, VERSION) { Ok(()) } else { Err(StoreError::NotDisagreements) }
+    let path = path.as_ref();
+    let found = DISAGREEMENTS.open(path, Mode::Existing).and_then(|connection| Ok(read(&connection)?));
+    found.map_err(|fault| fault.at(path))
 }
 
 fn read(connection: &Connection) -> rusqlite::Result<Vec<Disagreement>> {
-    let mut statement = connection.prepare(&format!("SELECT {COLUMNS} FROM disagreements ORDER BY id"))?;
+    let mut statement = connection.prepare("SELECT * FROM disagreements ORDER BY id")?;
     statement.query_map([], row)?.collect()
 }
 

@@ -503,10 +503,8 @@ pub(crate) fn begin(
     grids: Arc<Vec<Arc<QuestGrid>>>,
     record: &SessionRecord,
 ) -> Result<ParticipantSession, StoreError> {
-    // Databases of before had the seed alone
-    let plan = record.plan.clone().unwrap_or_else(|| Plan::draw(&study, record.seed));
-    if !plan.fits(&study) {
+    if !record.plan.fits(&study) {
         return Err(StoreError::Plan { code: record.code.clone() });
     }
-    Ok(ParticipantSession::new(study, grids, plan).simulated(record.simulated))
+    Ok(ParticipantSession::new(study, grids, record.plan.clone()).simulated(record.simulated))
 }

@@ -23,10 +23,8 @@ pub struct SessionRecord {
     /// When each event was stored, in milliseconds since 1970.
     #[serde(default)]
     pub received_ms: Vec<u64>,
-    /// The trials, as drawn when the session began; `None` in databases of before, which draw them again from
-    /// the seed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plan: Option<Plan>,
+    /// The trials, as drawn when the session began.
+    pub plan: Plan,
     /// All events, in order.
     pub events: Vec<Envelope>,
 }

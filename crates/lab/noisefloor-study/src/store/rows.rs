@@ -2,11 +2,9 @@
 
 use super::database::now_ms;
 use super::record::{NewSession, SessionRecord};
-use crate::config::Study;
 use crate::error::StoreError;
 use crate::event::Envelope;
-use crate::session::Plan;
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use rusqlite::{Connection, OptionalExtension, params};
 
 pub(super) fn all_codes(connection: &Connection) -> rusqlite::Result<Vec<String>> {
     let mut query = connection.prepare("SELECT code FROM sessions ORDER BY begun_ms, code")?;
@@ -29,27 +27,12 @@ pub(super) fn begin(connection: &Connection, session: &NewSession) -> Result<Str
     let insert = "INSERT INTO sessions VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
     let row = params![code, *seed as i64, group, simulated, now_ms(), ids];
     connection.execute(insert, row)?;
-    keep_plan(connection, code, plan)?;
+    let plan = serde_json::to_string(plan).unwrap_or_default();
+    connection.execute("INSERT INTO plans VALUES (?1, ?2)", [code, &plan])?;
     if let Some(token) = link {
         connection.execute("UPDATE links SET code = ?2 WHERE token = ?1", [token, code])?;
     }
     Ok(code.clone())
-}
-
-fn keep_plan(connection: &Connection, code: &str, plan: &Plan) -> rusqlite::Result<()> {
-    let text = serde_json::to_string(plan).unwrap_or_default();
-    connection.execute("INSERT INTO plans VALUES (?1, ?2)", [code, &text]).map(drop)
-}
-
-/// Draws and keeps the plans of sessions that have only the seed of theirs.
-pub(super) fn keep_plans(connection: &Connection, study: &Study) -> Result<(), StoreError> {
-    let query = "SELECT code, seed FROM sessions WHERE code NOT IN (SELECT code FROM plans)";
-    let mut statement = connection.prepare(query)?;
-    let without = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)? as u64)))?;
-    for (code, seed) in without.collect::<rusqlite::Result<Vec<(String, u64)>>>()? {
-        keep_plan(connection, &code, &Plan::draw(study, seed))?;
-    }
-    Ok(())
 }
 
 pub(super) fn append(connection: &Connection, code: &str, envelope: &Envelope) -> Result<(), StoreError> {
@@ -79,26 +62,22 @@ fn parse(text: &str, code: &str, seq: u64) -> Result<Envelope, StoreError> {
 
 pub(super) fn load(connection: &Connection, code: &str) -> Result<SessionRecord, StoreError> {
     let query = "SELECT seed, observers, simulated, begun_ms, ids, plan
-                 FROM sessions LEFT JOIN plans USING (code) WHERE code = ?1";
-    let mut plan = None;
-    let record = |row: &Row<'_>| {
-        plan = row.get::<_, Option<String>>(5)?;
-        Ok(SessionRecord {
-            code: code.to_owned(),
-            seed: row.get::<_, i64>(0)? as u64,
-            group: row.get(1)?,
-            simulated: row.get(2)?,
-            begun_ms: row.get(3)?,
-            ids: serde_json::from_str(&row.get::<_, String>(4)?).unwrap_or_default(),
-            received_ms: Vec::new(),
-            plan: None,
-            events: Vec::new(),
-        })
+                 FROM sessions JOIN plans USING (code) WHERE code = ?1";
+    let mut statement = connection.prepare_cached(query)?;
+    let mut found = statement.query([code])?;
+    let row = found.next()?.ok_or_else(|| StoreError::Unknown(code.to_owned()))?;
+    let plan = serde_json::from_str(&row.get::<_, String>(5)?);
+    let mut record = SessionRecord {
+        code: code.to_owned(),
+        seed: row.get::<_, i64>(0)? as u64,
+        group: row.get(1)?,
+        simulated: row.get(2)?,
+        begun_ms: row.get(3)?,
+        ids: serde_json::from_str(&row.get::<_, String>(4)?).unwrap_or_default(),
+        received_ms: Vec::new(),
+        plan: plan.map_err(|_| StoreError::Plan { code: code.to_owned() })?,
+        events: Vec::new(),
     };
-    let found = connection.query_row(query, [code], record).optional()?;
-    let mut record = found.ok_or_else(|| StoreError::Unknown(code.to_owned()))?;
-    let parsed = plan.map(|text| serde_json::from_str(&text)).transpose();
-    record.plan = parsed.map_err(|_| StoreError::Plan { code: code.to_owned() })?;
     let query = "SELECT seq, received_ms, envelope FROM events WHERE code = ?1 ORDER BY seq";
     let mut statement = connection.prepare_cached(query)?;
     let rows = statement.query_map([code], |row| Ok((row.get(0)?, row.get(1)?, row.get::<_, String>(2)?)))?;

@@ -2,8 +2,7 @@
 
 use super::database::{Mode, open};
 use super::record::{NewSession, SessionRecord};
-use super::rows::{all_codes, append, begin, erase, event, keep_plans, load, scrub};
-use crate::config::Study;
+use super::rows::{all_codes, append, begin, erase, event, load, scrub};
 use crate::error::StoreError;
 use crate::event::Envelope;
 use rusqlite::{Connection, TransactionBehavior};
@@ -49,11 +48,6 @@ impl AnswerStore {
         let work = move || write(&mut connection, &received);
         std::thread::Builder::new().name("answers".into()).spawn(work).map_err(|_| StoreError::Closed)?;
         Ok(Self { commands, path })
-    }
-
-    /// Draws and stores the trials of sessions that were begun before trials were stored.
-    pub(crate) async fn keep_plans(&self, study: Arc<Study>) -> Result<(), StoreError> {
-        self.ask(false, move |connection| keep_plans(connection, &study)).await
     }
 
     /// Begins a session and returns its code. A link that was used before leads to the session it began.

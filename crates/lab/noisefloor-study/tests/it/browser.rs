@@ -358,7 +358,7 @@ fn simulated_observers_drive_the_pages_and_a_model_learns_from_them() {
     let (mut level95, mut means) = (0, 0.0);
     for (i, tile) in report.tiles.iter().enumerate() {
         let truth = public.quantile(i / 4, i % 4, 0.95) * public.bias.exp();
-        let [low, high] = tile.level95_interval.unwrap();
+        let (low, high) = tile.level95_low.zip(tile.level95_high).unwrap();
         level95 += usize::from((low..=high).contains(&truth));
         means += (tile.median / (public.thresholds[i / 4][i % 4] * public.bias.exp())).ln() / 8.0;
         println!("tile {i}: {truth:.0} in {low:.0} to {high:.0}? median {:.0}", tile.median);

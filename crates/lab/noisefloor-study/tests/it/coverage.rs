@@ -29,11 +29,11 @@ fn coverage(study: &Arc<Study>, public: &Public, observers: u64, studies: u64) -
     let (mut median, mut level95, mut ratio) = (0.0, 0.0, 0.0);
     for seed in 0..studies {
         for tile in &reported(study, public, observers, seed).tiles {
-            let holds = |interval: Option<[f64; 2]>, truth: f64| {
-                f64::from(interval.is_some_and(|[low, high]| low <= truth && truth <= high))
+            let holds = |low: Option<f64>, high: Option<f64>, truth: f64| {
+                f64::from(low.zip(high).is_some_and(|(low, high)| low <= truth && truth <= high))
             };
-            median += holds(tile.median_interval, truths[tile.tile][0]);
-            level95 += holds(tile.level95_interval, truths[tile.tile][1]);
+            median += holds(tile.median_low, tile.median_high, truths[tile.tile][0]);
+            level95 += holds(tile.level95_low, tile.level95_high, truths[tile.tile][1]);
             ratio += (tile.level95 / truths[tile.tile][1]).ln();
         }
     }
@@ -77,7 +77,8 @@ fn means_are_those_of_thresholds_not_of_levels() {
         for tile in &reported(&study, &public, 33, seed).tiles {
             let truth = public.levels(0, tile.tile)[1];
             ratio += (tile.mean / truth).ln() / 24.0;
-            holds += usize::from(tile.mean_interval.is_some_and(|[low, high]| low <= truth && truth <= high));
+            let interval = tile.mean_low.zip(tile.mean_high);
+            holds += usize::from(interval.is_some_and(|(low, high)| low <= truth && truth <= high));
         }
     }
     println!("mean: ratio {:.3}, intervals that hold it {holds} of 24", f64::exp(ratio));

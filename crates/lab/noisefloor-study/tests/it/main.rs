@@ -12,5 +12,5 @@ mod kit; // studies, stacks and servers for the tests
 mod outputs; // raw data, languages and copies of the database
 mod proxy; // a study behind a real proxy
 mod session; // the state of a session, without a server
-mod stored; // databases of earlier versions, and the trials that are stored with a session
+mod stored; // the trials that are stored with a session
 mod study; // study files and stacks, good and bad
