@@ -1,7 +1,7 @@
 //! A study file: as it is written, the rules that it fixes before anyone answers, and the checked study.
 
 use crate::error::StudyError;
-use crate::stack::{Source, StudyStack};
+use crate::stack::{StackEntry, StudyStack};
 use noisefloor::tile::DEFAULT_TILE;
 use noisefloor_pages::languages::{Language, read_languages};
 use noisefloor_pages::viewing::ViewingLimits;
@@ -108,16 +108,7 @@ impl Study {
         beside: &Path,
     ) -> Result<Self, StudyError> {
         let tile = file.tile.unwrap_or(DEFAULT_TILE);
-        let stack = |entry: StackEntry| {
-            StudyStack::open(Source {
-                name: entry.name,
-                renderer: entry.renderer,
-                folder: beside.join(entry.folder),
-                stops: entry.stops.map(|stops| beside.join(stops)),
-                fps: entry.fps,
-                tile,
-            })
-        };
+        let stack = |entry| StudyStack::open(entry, beside, tile);
         let twice = file.protocol == StudyProtocol::Acquisition;
         Ok(Self {
             protocol: file.protocol,
@@ -452,41 +443,27 @@ impl Question {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) struct StudyFile {
-    pub(super) protocol: StudyProtocol,
-    pub(super) database: PathBuf,
-    pub(super) languages: Option<PathBuf>,
-    pub(super) tile: Option<usize>,
-    pub(super) repeats: Option<u32>,
-    pub(super) seed: Option<u64>,
-    pub(super) trials: Option<u32>,
-    pub(super) interval_ms: Option<u32>,
-    pub(super) minutes: Option<u32>,
-    pub(super) break_every: Option<u32>,
+struct StudyFile {
+    protocol: StudyProtocol,
+    database: PathBuf,
+    languages: Option<PathBuf>,
+    tile: Option<usize>,
+    repeats: Option<u32>,
+    seed: Option<u64>,
+    trials: Option<u32>,
+    interval_ms: Option<u32>,
+    minutes: Option<u32>,
+    break_every: Option<u32>,
     #[serde(default)]
-    pub(super) groups: Vec<String>,
+    groups: Vec<String>,
     #[serde(default)]
-    pub(super) participants: Participants,
+    participants: Participants,
     #[serde(default)]
-    pub(super) screening: Screening,
+    screening: Screening,
     #[serde(default)]
-    pub(super) viewing: ViewingLimits,
+    viewing: ViewingLimits,
     #[serde(default)]
-    pub(super) question: Vec<Question>,
-    pub(super) text: BTreeMap<String, Texts>,
-    pub(super) stack: Vec<StackEntry>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) struct StackEntry {
-    pub(super) name: String,
-    pub(super) folder: PathBuf,
-    #[serde(default)]
-    pub(super) renderer: String,
-    /// Where each tile stopped: `stops.csv` of `noisefloor render`, or a table with the columns `tile` and
-    /// `spp`.
-    pub(super) stops: Option<PathBuf>,
-    /// Frames per second of a loop: the folder then has a folder of pictures for each frame.
-    fps: Option<f64>,
+    question: Vec<Question>,
+    text: BTreeMap<String, Texts>,
+    stack: Vec<StackEntry>,
 }

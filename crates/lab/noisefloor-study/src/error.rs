@@ -29,13 +29,9 @@ pub enum StudyError {
     Store(#[from] StoreError),
     #[error(transparent)]
     Pages(#[from] PagesError),
+    /// Anything else, in words: there are no answers to analyse, say.
     #[error("{0}")]
-    StackRender(String),
-    #[error("{0}")]
-    Explore(String),
-    /// The analysis is impossible, for example because there are no answers.
-    #[error("{0}")]
-    Analysis(String),
+    Other(String),
 }
 
 /// What is wrong with a file of a study.

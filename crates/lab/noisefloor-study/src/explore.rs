@@ -54,7 +54,7 @@ impl ExploreServer {
         for (path, name) in setup.pictures.iter().zip(names) {
             gallery
                 .add(GalleryPicture::read(path, setup.layer.as_deref())?.called(name))
-                .map_err(|error| StudyError::Explore(error.to_string()))?;
+                .map_err(|error| StudyError::Other(error.to_string()))?;
         }
         let kept = Arc::new(Disagreements::open(&setup.database)?);
         let listening = Listening::bind(address, exposure).await?;

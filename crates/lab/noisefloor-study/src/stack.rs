@@ -6,6 +6,7 @@ use image::{ExtendedColorType, ImageEncoder, ImageError};
 use noisefloor::{Rgb, Tile, TileGrid, ToneMapping, display::Display};
 use noisefloor_image::{Frame, Picture, read_picture, running_means};
 use rayon::prelude::*;
+use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -19,13 +20,19 @@ const MAX_FRAMES: usize = 240;
 /// Most lines of a table of stops.
 const MAX_STOPS: usize = 100_000;
 
-pub(crate) struct Source {
+/// A stack as a study file names it; paths start at that file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct StackEntry {
     pub(crate) name: String,
-    pub(crate) renderer: String,
     pub(crate) folder: PathBuf,
+    #[serde(default)]
+    pub(crate) renderer: String,
+    /// Where each tile stopped: `stops.csv` of `noisefloor render`, or a table with the columns `tile` and
+    /// `spp`.
     pub(crate) stops: Option<PathBuf>,
+    /// Frames per second of a loop: the folder then has a folder of pictures for each frame.
     pub(crate) fps: Option<f64>,
-    pub(crate) tile: usize,
 }
 
 /// Pictures of one view, ordered by samples per pixel. The last one is the reference. Each is a still, or a
@@ -51,8 +58,9 @@ pub struct StudyStack {
 }
 
 impl StudyStack {
-    pub(crate) fn open(source: Source) -> Result<Self, StudyError> {
-        let Source { name, renderer, folder, stops, fps, tile } = source;
+    pub(crate) fn open(entry: StackEntry, beside: &Path, tile: usize) -> Result<Self, StudyError> {
+        let StackEntry { name, renderer, folder, stops, fps } = entry;
+        let folder = beside.join(folder);
         let folders = if fps.is_some() { frames_of(&folder)? } else { vec![folder.clone()] };
         let (levels, first) = running(&folders[0])?;
         if !(2..=MAX_LEVELS).contains(&levels.len()) {
@@ -90,7 +98,7 @@ impl StudyStack {
         };
 
         // Where the tiles stopped, as levels
-        let spp = stops.map(|path| read_stops(&path, grid)).transpose()?;
+        let spp = stops.map(|path| read_stops(&beside.join(path), grid)).transpose()?;
         let level_of =
             |spp: f64| levels.iter().position(|&l| l as f64 >= spp).unwrap_or(levels.len() - 1) as u32;
         let share = |share: f64| -> Option<Vec<u32>> {
@@ -216,6 +224,11 @@ pub(crate) fn png((width, height): (usize, usize), rgb: &[u8]) -> Result<Vec<u8>
         ExtendedColorType::Rgb8,
     )?;
     Ok(png)
+}
+
+/// ln(samples per pixel) of a level.
+pub(crate) fn ln_spp(spp: &[u64], level: u32) -> f64 {
+    (spp[level as usize].max(1) as f64).ln()
 }
 
 /// Levels and pictures of one folder.

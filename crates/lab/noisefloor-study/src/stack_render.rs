@@ -22,7 +22,7 @@ pub fn render_stack(
     mut go_on: impl FnMut(u64, u64) -> bool,
     mut finish: impl FnMut(Vec<Rgb>) -> Result<Vec<Rgb>, StudyError>,
 ) -> Result<(), StudyError> {
-    let bad = |what: String| StudyError::StackRender(what);
+    let bad = StudyError::Other;
     if levels.len() < 2 || levels[0] == 0 || !levels.is_sorted_by(|a, b| a < b) {
         return Err(bad(
             "a stack needs at least two levels, each with more samples than the one before".into()

@@ -3,6 +3,7 @@
 use super::observers::{Observer, places};
 use super::summary::{median, pearson};
 use crate::config::Study;
+use crate::stack::ln_spp;
 use serde::Serialize;
 
 /// Agreement of observers with themselves, over the first two showings of each tile.
@@ -37,8 +38,7 @@ pub(super) fn repeats(study: &Study, observers: &[&Observer]) -> Option<RepeatAg
     for observer in observers {
         for (place, stops) in observer.stops.iter().filter(|(_, stops)| stops.len() > 1) {
             let spp = study.stacks[place.0 as usize].levels();
-            let ln = |level: u32| (spp[level as usize].max(1) as f64).ln();
-            pairs.push((ln(stops[0]), ln(stops[1])));
+            pairs.push((ln_spp(spp, stops[0]), ln_spp(spp, stops[1])));
             near += usize::from(stops[0].abs_diff(stops[1]) <= 1);
         }
     }

@@ -1,53 +1,15 @@
 //! An analysis as files: tables, a corpus for `train`, plots, and the grid over the picture.
 
 use super::plots;
-
-use super::report::{ClassRow, StudyReport};
-use super::spread::PeopleSpread;
+use super::report::StudyReport;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::config::Study;
 use crate::error::StudyError;
 use noisefloor_image::{write_atomic, write_csv, write_png};
 use noisefloor_learn::ThresholdRow;
-use serde::Serialize;
 use std::fs::{create_dir_all, read_link, remove_file};
 use std::io::Write;
 use std::path::Path;
-
-#[derive(Serialize)]
-struct TileLine<'a> {
-    stack: &'a str,
-    tile: usize,
-    x: usize,
-    y: usize,
-    width: usize,
-    height: usize,
-    observers: usize,
-    mean: f64,
-    mean_low: Option<f64>,
-    mean_high: Option<f64>,
-    median: f64,
-    median_low: Option<f64>,
-    median_high: Option<f64>,
-    quartiles: f64,
-    level95: f64,
-    level95_low: Option<f64>,
-    level95_high: Option<f64>,
-    beyond: bool,
-    fit_probability: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct ClassLine {
-    class: String,
-    identical: usize,
-    answers: usize,
-    share: f64,
-    wilson_low: f64,
-    wilson_high: f64,
-    observers_low: Option<f64>,
-    observers_high: Option<f64>,
-}
 
 /// Writes `index.html` with all plots, `report.json`, `observers.csv` and, as the protocol has them, `tiles.csv`,
 /// `classes.csv`, plots, `grid-STACK.png` and the folder `corpus`, which `noisefloor-lab train --corpus` takes.
@@ -64,24 +26,30 @@ pub fn write(
     write_atomic(dir.join("report.json"), |to| serde_json::to_writer_pretty(to, report))?;
     write_csv(dir.join("observers.csv"), &report.observers)?;
     if !report.classes.is_empty() {
-        let line = |row: &ClassRow| ClassLine {
-            class: format!("{:?}", row.class).to_lowercase(),
-            identical: row.identical.yes,
-            answers: row.identical.of,
-            share: row.identical.share,
-            wilson_low: row.identical.wilson[0],
-            wilson_high: row.identical.wilson[1],
-            observers_low: row.observers_interval.map(|i| i[0]),
-            observers_high: row.observers_interval.map(|i| i[1]),
-        };
-        write_csv(dir.join("classes.csv"), report.classes.iter().map(line))?;
-        svg(&dir.join("classes.svg"), plots::classes(&report.classes)?)?;
-        page.add("How often pairs are called identical", "classes.svg", "classes.csv");
+        write_csv(dir.join("classes.csv"), &report.classes)?;
+        page.0 += &table(
+            "How often pairs are called identical",
+            &["class", "answers", "identical", "95 % interval (Wilson)", "over observers"],
+            &report.classes,
+            |c| {
+                let class = format!("{:?}", c.class).to_lowercase();
+                let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+                let [wilson, observers] =
+                    [(Some(c.wilson_low), Some(c.wilson_high)), (c.observers_low, c.observers_high)].map(
+                        |(low, high)| {
+                            low.zip(high).map_or("none".to_owned(), |(low, high)| {
+                                format!("{} to {}", percent(low), percent(high))
+                            })
+                        },
+                    );
+                vec![class, c.answers.to_string(), percent(c.share), wilson, observers]
+            },
+        );
     }
     if report.tiles.is_empty() {
         return page.write(dir, report);
     }
-    write_csv(dir.join("tiles.csv"), report.tiles.iter().map(tile_line))?;
+    write_csv(dir.join("tiles.csv"), &report.tiles)?;
     svg(&dir.join("thresholds.svg"), plots::thresholds(&report.tiles)?)?;
     page.add("Thresholds of the tiles", "thresholds.svg", "tiles.csv");
     // A model keeps the name of the corpus it is trained on.
@@ -143,25 +111,42 @@ impl Page {
     }
 }
 
-/// The spread of people, as a table.
-fn spread(report: &StudyReport) -> String {
-    if report.spread.is_empty() {
+/// A section with a table; empty without rows.
+fn table<T>(title: &str, columns: &[&str], rows: &[T], cells: impl Fn(&T) -> Vec<String>) -> String {
+    if rows.is_empty() {
         return String::new();
     }
-    let row = |s: &PeopleSpread| {
-        let name = s.stack.as_deref().map_or("all".to_owned(), escaped);
-        let interval = s.interval.map_or("none".to_owned(), |[low, high]| format!("{low:.2} to {high:.2}"));
-        let PeopleSpread { observers, tiles, people, common, by_place, within, .. } = s;
-        format!(
-            "<tr><th>{name}</th><td>{observers}</td><td>{tiles}</td><td>{people:.2}</td><td>{interval}</td>\
-             <td>{common:.2}</td><td>{by_place:.2}</td><td>{within:.2}</td></tr>\n"
-        )
+    let line = |cell: &str, cells: &[String]| {
+        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escaped(text)));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
     };
-    let rows: String = report.spread.iter().map(row).collect();
-    format!(
-        "<section>\n<h2>How far people lie from each other, in ln(samples)</h2>\n<table>\n<tr><th>stack</th>\
-         <th>observers</th><th>tiles</th><th>people, one place</th><th>95 % interval</th><th>in all tiles</th>\
-         <th>by tile</th><th>by showing</th></tr>\n{rows}</table>\n</section>\n"
+    let head = line("th", &columns.iter().map(|&name| name.to_owned()).collect::<Vec<_>>());
+    let rows: String = rows.iter().map(|row| line("td", &cells(row))).collect();
+    format!("<section>\n<h2>{title}</h2>\n<table>\n{head}{rows}</table>\n</section>\n")
+}
+
+fn spread(report: &StudyReport) -> String {
+    table(
+        "How far people lie from each other, in ln(samples)",
+        &[
+            "stack",
+            "observers",
+            "tiles",
+            "people, one place",
+            "95 % interval",
+            "in all tiles",
+            "by tile",
+            "by showing",
+        ],
+        &report.spread,
+        |s| {
+            let name = s.stack.clone().unwrap_or("all".to_owned());
+            let interval =
+                s.interval.map_or("none".to_owned(), |[low, high]| format!("{low:.2} to {high:.2}"));
+            let of = |deviation: f64| format!("{deviation:.2}");
+            let (observers, tiles) = (s.observers.to_string(), s.tiles.to_string());
+            vec![name, observers, tiles, of(s.people), interval, of(s.common), of(s.by_place), of(s.within)]
+        },
     )
 }
 
@@ -177,31 +162,6 @@ fn svg(path: &Path, text: String) -> Result<(), StudyError> {
     Ok(write_atomic(path, |to| to.write_all(text.as_bytes()))?)
 }
 
-fn tile_line(t: &TileRow) -> TileLine<'_> {
-    let end = |interval: Option<[f64; 2]>, i: usize| interval.map(|ends| ends[i]);
-    TileLine {
-        stack: &t.stack,
-        tile: t.tile,
-        x: t.x,
-        y: t.y,
-        width: t.width,
-        height: t.height,
-        observers: t.observers,
-        mean: t.mean,
-        mean_low: end(t.mean_interval, 0),
-        mean_high: end(t.mean_interval, 1),
-        median: t.median,
-        median_low: end(t.median_interval, 0),
-        median_high: end(t.median_interval, 1),
-        quartiles: t.quartiles,
-        level95: t.level95,
-        level95_low: end(t.level95_interval, 0),
-        level95_high: end(t.level95_interval, 1),
-        beyond: t.beyond,
-        fit_probability: t.fit_probability,
-    }
-}
-
 /// `thresholds.csv` as [`noisefloor_learn::Corpus`] reads it. Thresholds lie within what was offered: one
 /// beyond is then taken for a lower bound.
 fn corpus(
@@ -214,10 +174,6 @@ fn corpus(
     let row = |t: &TileRow| {
         let stack = study.stacks.iter().find(|s| s.name() == t.stack && s.fps().is_none())?;
         let (first_spp, last_spp) = (stack.levels()[0], stack.levels()[stack.last() as usize]);
-        let spp = match threshold {
-            CorpusThreshold::Level95 => t.level95,
-            CorpusThreshold::Mean => t.mean,
-        };
         let (scene, renderer) = (t.stack.clone(), stack.renderer().to_owned());
         let TileRow { tile, x, y, width, height, .. } = *t;
         Some(ThresholdRow {
@@ -228,7 +184,7 @@ fn corpus(
             y,
             width,
             height,
-            human_spp: spp.clamp(first_spp.max(1) as f64, last_spp as f64),
+            human_spp: t.threshold(threshold).clamp(first_spp.max(1) as f64, last_spp as f64),
             first_spp,
             last_spp,
             reference_spp: None,

@@ -1,6 +1,5 @@
 //! Intervals: Wilson's for shares, the bootstrap over observers for everything else.
 
-use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Two-sided normal quantile of a 95 % interval.
@@ -8,29 +7,14 @@ const Z: f64 = 1.959_963_984_540_054;
 /// Number of bootstrap resamples.
 pub(super) const RESAMPLES: usize = 1000;
 
-/// A share of answers with its 95 % interval (Wilson 1927; Brown, Cai and DasGupta 2001, eq. 4).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Share {
-    pub yes: usize,
-    pub of: usize,
-    /// `yes / of`.
-    pub share: f64,
-    /// Wilson's interval, valid for independent answers.
-    pub wilson: [f64; 2],
-}
-
-impl Share {
-    /// Share of `yes` among `of` answers; `None` if there are none.
-    pub fn new(yes: usize, of: usize) -> Option<Self> {
-        if of == 0 || yes > of {
-            return None;
-        }
-        let (n, p) = (of as f64, yes as f64 / of as f64);
-        let (middle, width) = (p + Z * Z / (2.0 * n), Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt());
-        let end = |sign: f64| ((middle + sign * width) / (1.0 + Z * Z / n)).clamp(0.0, 1.0);
-        // Rounding must not leave the share outside its own interval
-        Some(Self { yes, of, share: p, wilson: [end(-1.0).min(p), end(1.0).max(p)] })
-    }
+/// The 95 % interval of a share of `yes` among `of` independent answers, one at least (Wilson 1927; Brown, Cai and
+/// DasGupta 2001, eq. 4).
+pub(super) fn wilson(yes: usize, of: usize) -> [f64; 2] {
+    let (n, p) = (of as f64, yes as f64 / of as f64);
+    let (middle, width) = (p + Z * Z / (2.0 * n), Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt());
+    let end = |sign: f64| ((middle + sign * width) / (1.0 + Z * Z / n)).clamp(0.0, 1.0);
+    // Rounding must not leave the share outside its own interval
+    [end(-1.0).min(p), end(1.0).max(p)]
 }
 
 /// The 95 % intervals of some statistics over observers: observers are drawn anew, with replacement,
@@ -83,12 +67,11 @@ mod tests {
     /// one half.
     #[test]
     fn wilson_has_known_values() {
-        let none = Share::new(0, 10).unwrap();
-        assert!(none.wilson[0] == 0.0 && (none.wilson[1] - Z * Z / (10.0 + Z * Z)).abs() < 1e-12);
-        let half = Share::new(5, 10).unwrap().wilson;
+        let none = wilson(0, 10);
+        assert!(none[0] == 0.0 && (none[1] - Z * Z / (10.0 + Z * Z)).abs() < 1e-12);
+        let half = wilson(5, 10);
         assert!((half[0] - 0.2366).abs() < 1e-4 && (half[1] - 0.7634).abs() < 1e-4, "{half:?}");
-        assert_eq!(Share::new(10, 10).unwrap().wilson[1], 1.0);
-        assert!(Share::new(0, 0).is_none() && Share::new(2, 1).is_none());
+        assert_eq!(wilson(10, 10)[1], 1.0);
     }
 
     /// The interval of a mean of 20 normal values covers the truth in 95 % of 400 seeded studies, within

@@ -4,6 +4,7 @@ use super::fit::Observation;
 use crate::config::Study;
 use crate::error::StudyError;
 use crate::session::{CatchKind, Class, Haste, Stage, TrialOutcome, grids, replay};
+use crate::stack::ln_spp;
 use crate::store::SessionRecord;
 use noisefloor_pages::questplus::Posterior;
 use noisefloor_pages::viewing::{Conditions, ViewingProblem};
@@ -106,12 +107,11 @@ impl Observer {
 /// The ends of where a threshold lies that was left at a level, in ln(spp): the level before, and that one. The reference
 /// has no noise, so that what is left there is taken to be one more step away.
 pub(super) fn between(spp: &[u64], level: u32) -> [f64; 2] {
-    let ln = |level: usize| (spp[level].max(1) as f64).ln();
-    let (at, last) = (level as usize, spp.len() - 1);
-    match at {
+    let (ln, last) = (|level| ln_spp(spp, level), spp.len() as u32 - 1);
+    match level {
         0 => [ln(0); 2],
-        _ if at == last && last > 1 => [ln(last - 1), 2.0 * ln(last - 1) - ln(last - 2)],
-        _ => [ln(at - 1), ln(at)],
+        _ if level == last && last > 1 => [ln(last - 1), 2.0 * ln(last - 1) - ln(last - 2)],
+        _ => [ln(level - 1), ln(level)],
     }
 }
 

@@ -1,6 +1,5 @@
 //! Plots of an analysis.
 
-use super::report::ClassRow;
 use super::tiles::{CorpusThreshold, TileRow};
 use crate::error::StudyError;
 use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_7X13_BOLD, FONT_9X18_BOLD};
@@ -13,7 +12,6 @@ use std::ops::Range;
 
 const SIZE: (u32, u32) = (720, 480);
 const LETTERS: (&str, u32) = ("sans-serif", 15);
-const INK: RGBColor = RGBColor(40, 40, 40);
 const BLUE: RGBColor = RGBColor(0, 114, 178);
 const VERMILION: RGBColor = RGBColor(213, 94, 0);
 const POINTS: usize = 120;
@@ -32,7 +30,7 @@ fn svg(draw: impl FnOnce(&Area<'_>) -> Result<(), StudyError>) -> Result<String,
 
 impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for StudyError {
     fn from(error: DrawingAreaErrorKind<E>) -> Self {
-        Self::Analysis(format!("a plot cannot be drawn: {error}"))
+        Self::Other(format!("a plot cannot be drawn: {error}"))
     }
 }
 
@@ -49,7 +47,7 @@ fn ticks(covered: &Range<f64>) -> Vec<f64> {
 /// Mean and 95 % level of each tile with intervals, in table order.
 pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
     let all = tiles.iter().flat_map(|t| {
-        let ends = [t.mean_interval, t.level95_interval].into_iter().flatten().flatten();
+        let ends = [t.mean_low, t.mean_high, t.level95_low, t.level95_high].into_iter().flatten();
         ends.chain([t.mean, t.level95]).collect::<Vec<_>>()
     });
     let (low, high) = all.fold((f64::INFINITY, 1.0f64), |(l, h), v| (l.min(v.max(0.1)), h.max(v)));
@@ -78,12 +76,12 @@ pub(super) fn thresholds(tiles: &[TileRow]) -> Result<String, StudyError> {
             .light_line_style(WHITE)
             .draw()?;
         for (i, tile) in tiles.iter().enumerate() {
-            for (shift, value, interval, colour) in [
-                (-0.12, tile.mean, tile.mean_interval, BLUE),
-                (0.12, tile.level95, tile.level95_interval, VERMILION),
+            for (shift, value, low, high, colour) in [
+                (-0.12, tile.mean, tile.mean_low, tile.mean_high, BLUE),
+                (0.12, tile.level95, tile.level95_low, tile.level95_high, VERMILION),
             ] {
                 let x = i as f64 + shift;
-                if let Some([low, high]) = interval {
+                if let Some((low, high)) = low.zip(high) {
                     let line = PathElement::new([(x, low), (x, high)], colour.stroke_width(2));
                     chart.draw_series([line])?;
                 }
@@ -126,40 +124,6 @@ pub(super) fn curves(tiles: &[&TileRow], levels: &[u64]) -> Result<String, Study
     })
 }
 
-/// The paper's Table 2 as points with Wilson's intervals.
-pub(super) fn classes(rows: &[ClassRow]) -> Result<String, StudyError> {
-    svg(|root| {
-        let mut chart = ChartBuilder::on(root)
-            .margin(12)
-            .x_label_area_size(44)
-            .y_label_area_size(64)
-            .build_cartesian_2d(-0.5..rows.len() as f64 - 0.5, 0.0..1.0)?;
-        let name = |x: &f64| {
-            let row = (x.round() - x).abs() < 1e-6;
-            let row = row.then(|| rows.get(x.round() as usize)).flatten();
-            row.map_or(String::new(), |r| format!("{:?}", r.class).to_lowercase())
-        };
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .x_labels(2 * rows.len() + 1)
-            .x_label_formatter(&name)
-            .y_desc("share called identical, 95 % intervals")
-            .label_style(LETTERS)
-            .axis_desc_style(LETTERS)
-            .light_line_style(WHITE)
-            .draw()?;
-        for (i, row) in rows.iter().enumerate() {
-            let [low, high] = row.identical.wilson;
-            let line = PathElement::new([(i as f64, low), (i as f64, high)], INK.stroke_width(2));
-            chart.draw_series([line])?;
-            let dot = Circle::new((i as f64, row.identical.share), 5, BLUE.filled());
-            chart.draw_series([dot])?;
-        }
-        Ok(())
-    })
-}
-
 /// The picture, three bytes a pixel, with the tile grid and a threshold in each tile (Takouachet et al. 2017,
 /// figure 3).
 pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold: CorpusThreshold) -> Canvas {
@@ -171,11 +135,7 @@ pub(super) fn grid(grid: TileGrid, picture: &[u8], tiles: &[&TileRow], threshold
         for y in t.y..t.y + t.height {
             canvas.set(t.x, y, [255; 3]);
         }
-        let spp = match threshold {
-            CorpusThreshold::Level95 => t.level95,
-            CorpusThreshold::Mean => t.mean,
-        };
-        let label = format!("{}{spp:.0}", if t.beyond { ">" } else { "" });
+        let label = format!("{}{:.0}", if t.beyond { ">" } else { "" }, t.threshold(threshold));
         let (font, advance) = match t.width {
             100.. => (&FONT_9X18_BOLD, 9),
             48.. => (&FONT_7X13_BOLD, 7),

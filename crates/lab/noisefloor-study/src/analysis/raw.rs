@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// One response. Columns are described by [`DICTIONARY`].
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ResponseRow {
     participant: String,
     group: String,
@@ -45,7 +45,7 @@ pub struct ResponseRow {
     pixels_per_degree: Option<f64>,
     distance_mm: Option<f64>,
     gamma: Option<f64>,
-    ambient: Option<String>,
+    ambient: Option<&'static str>,
     pixel_ratio: Option<f64>,
 }
 
@@ -119,28 +119,13 @@ impl ResponseRow {
             participant: participant(index),
             group: record.group.clone(),
             simulated: record.simulated,
-            trial: 0,
             role,
-            picture: String::new(),
-            onset: 0,
-            response_time: 0.0,
-            response: "",
-            tile: None,
-            x: None,
-            y: None,
-            level: None,
-            spp: None,
-            reference_side: None,
-            noise_interval: None,
-            first_interval_ms: None,
-            second_interval_ms: None,
-            frames_shown: None,
-            frames_dropped: None,
             pixels_per_degree: conditions.map(|c| c.pixels_per_degree()),
             distance_mm: conditions.map(|c| c.distance_mm),
             gamma: conditions.map(|c| c.gamma),
-            ambient: conditions.map(|c| format!("{:?}", c.ambient).to_lowercase()),
+            ambient: conditions.map(|c| c.ambient.name()),
             pixel_ratio: conditions.map(|c| c.pixel_ratio),
+            ..Self::default()
         }
     }
 

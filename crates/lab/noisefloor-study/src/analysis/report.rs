@@ -1,7 +1,7 @@
 //! The results of an analysis.
 
 use super::agreement::{self, BetweenObservers, RepeatAgreement};
-use super::interval::{Share, bootstrap};
+use super::interval::{bootstrap, wilson};
 use super::observers::{self, Observer, places};
 use super::screening;
 use super::spread::{PeopleSpread, spreads};
@@ -55,7 +55,7 @@ pub fn analyse(study: &Arc<Study>, options: AnalysisOptions) -> Result<StudyRepo
     if observers.is_empty() {
         let who = if options.simulated { "simulated observers" } else { "people" };
         let what = format!("{}: no answers of {who} yet; nothing to analyse", study.database.display());
-        return Err(StudyError::Analysis(what));
+        return Err(StudyError::Other(what));
     }
     Ok(report(study, &observers, options))
 }
@@ -82,13 +82,20 @@ pub fn report(study: &Study, observers: &[Observer], options: AnalysisOptions) -
 
 // Validation: how often pairs of each class are called identical (Takouachet et al. 2017, Table 2).
 
+/// A line of `classes.csv`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ClassRow {
     pub class: Class,
-    #[serde(flatten)]
-    pub identical: Share,
-    /// 95 % interval over observers: wider than Wilson's where answers of one observer are alike.
-    pub observers_interval: Option<[f64; 2]>,
+    pub identical: usize,
+    pub answers: usize,
+    /// `identical / answers`.
+    pub share: f64,
+    /// Wilson's 95 % interval, valid for independent answers.
+    pub wilson_low: f64,
+    pub wilson_high: f64,
+    /// 95 % interval over observers: wider where answers of one observer are alike.
+    pub observers_low: Option<f64>,
+    pub observers_high: Option<f64>,
 }
 
 /// The table; empty without answers.
@@ -100,16 +107,30 @@ fn class_rows(observers: &[&Observer], seed: u64) -> Vec<ClassRow> {
             (identical.count(), of.count())
         };
         let counts: Vec<(usize, usize)> = observers.iter().map(count).collect();
-        let (yes, of) = counts.iter().fold((0, 0), |(yes, of), c| (yes + c.0, of + c.1));
-        let share = |weights: &[f64]| {
+        let (identical, answers) = counts.iter().fold((0, 0), |(yes, of), c| (yes + c.0, of + c.1));
+        if answers == 0 {
+            return None;
+        }
+        let among = |weights: &[f64]| {
             let sum = |f: &dyn Fn(&(usize, usize)) -> usize| -> f64 {
                 counts.iter().zip(weights).map(|(c, w)| f(c) as f64 * w).sum()
             };
             Some([sum(&|c| c.0) / sum(&|c| c.1)])
         };
-        let identical = Share::new(yes, of)?;
-        let observers_interval = bootstrap(counts.len(), seed, [identical.share], share).map(|[i]| i);
-        Some(ClassRow { class, identical, observers_interval })
+        let share = identical as f64 / answers as f64;
+        let [wilson_low, wilson_high] = wilson(identical, answers);
+        let over_observers = bootstrap(counts.len(), seed, [share], among);
+        let [observers_low, observers_high] = [0, 1].map(|end| over_observers.map(|[ends]| ends[end]));
+        Some(ClassRow {
+            class,
+            identical,
+            answers,
+            share,
+            wilson_low,
+            wilson_high,
+            observers_low,
+            observers_high,
+        })
     };
     [Class::Reference, Class::Test, Class::Noisy].into_iter().filter_map(row).collect()
 }

@@ -4,6 +4,7 @@ use super::observers::{Observer, places};
 use super::summary::median;
 use crate::config::{Study, StudyProtocol};
 use crate::session::{Class, Haste, Stage};
+use crate::stack::ln_spp;
 use noisefloor_pages::viewing::ViewingProblem;
 use std::collections::BTreeSet;
 
@@ -128,8 +129,7 @@ impl LnThresholds {
             let apart = places.iter().filter_map(|place| {
                 let spp = study.stacks[place.0 as usize].levels();
                 let stops = o.stops.get(place).filter(|s| s.len() > 1)?;
-                let ln = |level: &u32| (spp[*level as usize].max(1) as f64).ln();
-                Some(ln(stops.iter().max()?) - ln(stops.iter().min()?))
+                Some(ln_spp(spp, *stops.iter().max()?) - ln_spp(spp, *stops.iter().min()?))
             });
             median(apart.collect())
         };

@@ -5,6 +5,7 @@ use super::interval::bootstrap;
 use super::observers::{Observer, TileKey, places};
 use super::summary::median;
 use crate::config::Study;
+use crate::stack::ln_spp;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -25,7 +26,8 @@ pub enum CorpusThreshold {
     Mean,
 }
 
-/// The threshold of one tile. Intervals are `None` for fewer than [`LEAST_OBSERVERS`].
+/// The threshold of one tile: a line of `tiles.csv`. Ends of 95 % intervals are `None` for fewer than
+/// [`LEAST_OBSERVERS`].
 #[derive(Clone, Debug, Serialize)]
 pub struct TileRow {
     pub stack: String,
@@ -41,27 +43,37 @@ pub struct TileRow {
     pub observers: usize,
     /// Mean over observers, in samples per pixel.
     pub mean: f64,
-    /// Its 95 % interval.
-    pub mean_interval: Option<[f64; 2]>,
+    pub mean_low: Option<f64>,
+    pub mean_high: Option<f64>,
     /// Samples per pixel at which half of the observers see no difference.
     pub median: f64,
-    /// Its 95 % interval.
-    pub median_interval: Option<[f64; 2]>,
+    pub median_low: Option<f64>,
+    pub median_high: Option<f64>,
     /// Distance between the quartiles of the observers, in ln(spp).
     pub quartiles: f64,
     /// Samples per pixel at which 95 % of observers see no difference.
     pub level95: f64,
-    /// Its 95 % interval.
-    pub level95_interval: Option<[f64; 2]>,
+    pub level95_low: Option<f64>,
+    pub level95_high: Option<f64>,
     /// Whether the 95 % level lies above the last level before the reference, and is therefore extrapolated.
     pub beyond: bool,
-    /// Samples per pixel of the reference, above which nothing is known.
-    pub reference: u64,
     /// Acquisition: probability of stops at least as unlike the fitted spread, if it were true. Below 0.01
     /// the estimates of the tile are doubtful.
     pub fit_probability: Option<f64>,
+    /// Samples per pixel of the reference, above which nothing is known.
+    #[serde(skip)]
+    pub reference: u64,
     #[serde(skip)]
     pub(super) fit: ThresholdFit,
+}
+
+impl TileRow {
+    pub(super) fn threshold(&self, which: CorpusThreshold) -> f64 {
+        match which {
+            CorpusThreshold::Level95 => self.level95,
+            CorpusThreshold::Mean => self.mean,
+        }
+    }
 }
 
 /// Thresholds of all tiles that have answers.
@@ -92,7 +104,11 @@ fn row(study: &Study, observers: &[&Observer], place: TileKey, alike: f64, seed:
     let enough = n >= LEAST_OBSERVERS;
     let found = mean(&vec![1.0; n])?;
     let seed = seed ^ (u64::from(place.0) << 32 | u64::from(place.1));
-    let mean_interval = bootstrap(n, seed, found, mean).map(|[i]| i).filter(|_| enough);
+    let mean_interval = bootstrap(n, seed, found, mean).map(|[i]| i);
+    let ends = |interval: Option<[f64; 2]>| [0, 1].map(|end| Some(interval.filter(|_| enough)?[end]));
+    let [mean_low, mean_high] = ends(mean_interval);
+    let [median_low, median_high] = ends(Some(fit.median.interval.map(f64::exp)));
+    let [level95_low, level95_high] = ends(Some(fit.level95.interval.map(f64::exp)));
     let tile = stack.grid().tile(place.1 as usize);
     let design = stops.len() as f64 / observations.iter().map(|(_, w)| w).sum::<f64>();
     Some(TileRow {
@@ -104,12 +120,15 @@ fn row(study: &Study, observers: &[&Observer], place: TileKey, alike: f64, seed:
         height: tile.height,
         observers: n,
         mean: found[0],
-        mean_interval,
+        mean_low,
+        mean_high,
         median: fit.median.value.exp(),
-        median_interval: enough.then_some(fit.median.interval.map(f64::exp)),
+        median_low,
+        median_high,
         quartiles: fit.width,
         level95: fit.level95.value.exp(),
-        level95_interval: enough.then_some(fit.level95.interval.map(f64::exp)),
+        level95_low,
+        level95_high,
         reference: stack.levels()[stack.last() as usize],
         beyond: fit.level95.value.exp() > stack.levels()[stack.last() as usize - 1] as f64,
         fit_probability: fit.fit_probability(&stops, stack.levels(), design),
@@ -132,7 +151,7 @@ fn repeat_correlation(study: &Study, observers: &[&Observer]) -> f64 {
     let (mut within, mut deviations) = (Vec::new(), Vec::new());
     for place in places(study) {
         let spp = study.stacks[place.0 as usize].levels();
-        let ln = |level: &u32| (spp[*level as usize].max(1) as f64).ln();
+        let ln = |level: &u32| ln_spp(spp, *level);
         let stops = || observers.iter().filter_map(|o| o.stops.get(&place));
         within.extend(stops().filter(|s| s.len() > 1).map(|s| (ln(&s[0]) - ln(&s[1])).abs()));
         if let Some(middle) = median(stops().flatten().map(ln).collect()) {

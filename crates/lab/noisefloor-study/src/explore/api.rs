@@ -29,32 +29,31 @@ const FILE_TIME: Duration = Duration::from_secs(120);
 /// Longest name of a file or a scene, in bytes.
 const MAX_NAME: usize = 200;
 
+const RELOAD: &str = "load the page again";
+
 pub(crate) type Answer = Result<Response, Refusal>;
 pub(crate) type Shared = State<Arc<App>>;
 pub(crate) type Named = Result<Path<String>, PathRejection>;
 
 impl From<GalleryError> for Refusal {
     fn from(error: GalleryError) -> Self {
-        let status = match &error {
-            GalleryError::Gone => StatusCode::NOT_FOUND,
-            _ => StatusCode::UNPROCESSABLE_ENTITY,
-        };
-        let do_ = match &error {
-            GalleryError::Gone => "load the page again",
-            GalleryError::NoSamples(_) => "type the number beside its name",
-            GalleryError::Still(StillError::Nothing) => "drop another rendering of the same view beside it",
-            GalleryError::Still(StillError::Undecided { .. } | StillError::Dependent { .. }) => {
-                "choose it under `Scene, relation, tiles`"
+        let (place, do_) = match &error {
+            GalleryError::Gone => {
+                return Self::new(StatusCode::NOT_FOUND, error.to_string(), "pictures", RELOAD);
             }
-            GalleryError::Many | GalleryError::Large => "take some away",
-            _ => "see `noisefloor judge --help` for what pictures can be held against each other",
+            GalleryError::NoSamples(_) => ("pictures", "type the number beside its name"),
+            GalleryError::Still(StillError::Nothing) => {
+                ("pictures", "drop another rendering of the same view beside it")
+            }
+            GalleryError::Still(StillError::Undecided { .. } | StillError::Dependent { .. }) => {
+                ("relation", "choose it under `Scene, relation, tiles`")
+            }
+            GalleryError::Many | GalleryError::Large => ("pictures", "take some away"),
+            _ => {
+                ("pictures", "see `noisefloor judge --help` for what pictures can be held against each other")
+            }
         };
-        let unclear = matches!(
-            &error,
-            GalleryError::Still(StillError::Undecided { .. } | StillError::Dependent { .. })
-        );
-        let place = if unclear { "relation" } else { "pictures" };
-        Self::new(status, error.to_string(), place, do_)
+        refuse(error.to_string(), place, do_)
     }
 }
 
@@ -63,7 +62,7 @@ pub(crate) fn refuse(what: impl Into<String>, place: &str, do_: &str) -> Refusal
 }
 
 pub(crate) fn gone(place: &str) -> Refusal {
-    Refusal::new(StatusCode::NOT_FOUND, "there is no such thing", place, "load the page again")
+    Refusal::new(StatusCode::NOT_FOUND, "there is no such thing", place, RELOAD)
 }
 
 /// The state the page starts from.
@@ -270,7 +269,7 @@ pub(crate) async fn lost(State(app): Shared, id: Named) -> Answer {
 }
 
 async fn png(make: impl FnOnce() -> Result<Vec<u8>, image::ImageError> + Send + 'static) -> Answer {
-    let broken = |e: image::ImageError| refuse(e.to_string(), "pictures", "load the page again");
+    let broken = |e: image::ImageError| refuse(e.to_string(), "pictures", RELOAD);
     let bytes = blocking(make).await?.map_err(broken)?;
     Ok(([(CONTENT_TYPE, "image/png")], bytes).into_response())
 }

@@ -46,8 +46,19 @@ impl App {
         self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(code);
     }
 
-    /// Rebuilds a session from its events.
-    pub(super) async fn load(&self, code: &str) -> Result<ParticipantSession, StoreError> {
+    /// The session of a slot, rebuilt from its events if it is not in memory.
+    async fn session<'a>(
+        &self,
+        code: &str,
+        live: &'a mut Option<ParticipantSession>,
+    ) -> Result<&'a mut ParticipantSession, Refusal> {
+        if live.is_none() {
+            *live = Some(self.load(code).await.inspect_err(|_| self.forget(code))?);
+        }
+        live.as_mut().ok_or_else(|| StoreError::Closed.into())
+    }
+
+    async fn load(&self, code: &str) -> Result<ParticipantSession, StoreError> {
         let record = self.store.load(code).await?;
         // Replaying a forced choice takes a tenth of a second
         let (study, grids) = (self.study.clone(), self.grids.clone());
@@ -63,62 +74,35 @@ impl App {
     ) -> Result<T, Refusal> {
         let place = self.place(code);
         let mut live = place.lock().await;
-        if live.is_none() {
-            match self.load(code).await {
-                Ok(session) => *live = Some(session),
-                Err(error) => {
-                    self.forget(code);
-                    return Err(error.into());
-                }
-            }
-        }
-        live.as_ref().map(with).ok_or_else(|| StoreError::Closed.into())
+        Ok(with(self.session(code, &mut live).await?))
     }
 
     /// Checks an event, stores it, and only then lets it count. A stored event is acknowledged again.
     pub(super) async fn record(&self, code: &str, envelope: Envelope) -> Result<ParticipantSession, Refusal> {
         let place = self.place(code);
         let mut live = place.lock().await;
-        let now = match live.take() {
-            Some(session) => session,
-            None => match self.load(code).await {
-                Ok(session) => session,
-                Err(error) => {
-                    self.forget(code);
-                    return Err(error.into());
-                }
-            },
-        };
-        let seq = envelope.seq;
-        if seq < now.events() {
-            let there = self.store.event(code, seq).await;
-            let same = matches!(&there, Ok(Some(there)) if *there == envelope);
-            let next = now.events();
-            let session = live.insert(now);
-            return match there {
-                Err(error) => Err(error.into()),
-                Ok(_) if same => Ok(session.clone()),
-                Ok(_) => Err(conflict(seq, next)),
-            };
+        let now = self.session(code, &mut live).await?;
+        let (seq, next) = (envelope.seq, now.events());
+        if seq < next {
+            let there = self.store.event(code, seq).await?;
+            return if there == Some(envelope) { Ok(now.clone()) } else { Err(conflict(seq, next)) };
         }
-        if seq > now.events() {
-            let next = now.events();
-            *live = Some(now);
+        if seq > next {
             return Err(conflict(seq, next));
         }
         let mut after = now.clone();
-        if let Err(misfit) = after.apply(&envelope.event) {
-            let next = now.events();
-            *live = Some(now);
+        after.apply(&envelope.event).map_err(|misfit| {
             let do_ = "load the session again, and show what it says";
             let refusal = Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, misfit.to_string(), "event", do_);
-            return Err(refusal.with_next_seq(next));
-        }
+            refusal.with_next_seq(next)
+        })?;
+        // Whether it is on disk is unknown after a failure: the session is then read again next time
         if let Err(error) = self.store.append(code, envelope).await {
-            // Whether it is on disk is unknown: the session is read again next time
+            *live = None;
             self.forget(code);
             return Err(error.into());
         }
-        Ok(live.insert(after).clone())
+        *now = after.clone();
+        Ok(after)
     }
 }

@@ -50,7 +50,7 @@ impl TileCache {
     }
 
     async fn make(&self, key: Key) -> Result<Arc<Vec<Bytes>>, StudyError> {
-        let stopped = || StudyError::Analysis("the server is being stopped".to_owned());
+        let stopped = || StudyError::Other("the server is being stopped".to_owned());
         let _turn = self.makers.acquire().await.map_err(|_| stopped())?;
         let (study, (stack, level, frame)) = (self.study.clone(), key);
         let work = move || study.stacks[stack as usize].tile_pngs(level, frame);

@@ -4,7 +4,7 @@ use crate::config::{Question, QuestionKind, Study};
 use crate::event::{Choice, StudyEvent, TrialTiming};
 use crate::server::StackView;
 use crate::session::Trial;
-use crate::stack::StudyStack;
+use crate::stack::{StudyStack, ln_spp};
 use noisefloor_pages::random::{logistic, seeded};
 use noisefloor_pages::viewing::{Ambient, Conditions};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -41,11 +41,8 @@ pub struct Public {
 pub enum SpreadShape {
     #[default]
     Logistic,
-    Normal,
     /// Lognormal with σ = ½: skewness 1.75, a long tail of demanding observers.
     Lognormal,
-    /// Gamma with shape 2: skewness 1.41.
-    Gamma,
 }
 
 impl SpreadShape {
@@ -53,18 +50,11 @@ impl SpreadShape {
     fn draw(self, random: &mut fastrand::Rng) -> f64 {
         let sd = PI / 3f64.sqrt();
         let p = random.f64().clamp(1e-12, 1.0 - 1e-12);
-        let normal = || Normal::standard().inverse_cdf(p);
         match self {
             Self::Logistic => (p / (1.0 - p)).ln(),
-            Self::Normal => sd * normal(),
             Self::Lognormal => {
                 let variance = (0.25f64.exp() - 1.0) * 0.25f64.exp();
-                sd * ((0.5 * normal()).exp() - 1.0) / variance.sqrt()
-            }
-            Self::Gamma => {
-                // The sum of two exponential values; 1.6783 is its median, √2 its standard deviation
-                let q = random.f64().clamp(1e-12, 1.0);
-                sd * (-p.ln() - q.ln() - 1.678_346_990_016_661) / 2f64.sqrt()
+                sd * ((0.5 * Normal::standard().inverse_cdf(p)).exp() - 1.0) / variance.sqrt()
             }
         }
     }
@@ -223,7 +213,7 @@ impl SimulatedObserver {
             }
             Trial::ForcedChoice { number, practice, stack, tile, first, second } => {
                 let noisy_first = first < second;
-                let spp = ln(&stacks[*stack as usize].levels, *first.min(second));
+                let spp = ln_spp(&stacks[*stack as usize].levels, *first.min(second));
                 let first = match self.behaviour {
                     _ if *practice => noisy_first,
                     Behaviour::StraightLiner => true,
@@ -251,8 +241,9 @@ impl SimulatedObserver {
         let last = spp.len() as u32 - 1;
         let deviation = logistic(&mut self.random, self.within) + self.bias;
         let mut noisier = left.iter().zip(right).map(|(a, b)| *a.min(b)).enumerate();
-        noisier
-            .any(|(tile, level)| level < last && self.ln_thresholds[stack][tile] + deviation > ln(spp, level))
+        noisier.any(|(tile, level)| {
+            level < last && self.ln_thresholds[stack][tile] + deviation > ln_spp(spp, level)
+        })
     }
 
     /// The level to which this observer takes a tile. Nobody fails the practice here.
@@ -275,7 +266,7 @@ impl SimulatedObserver {
             return self.random.u32(0..=last);
         }
         let now = self.ln_thresholds[stack][tile] + logistic(&mut self.random, self.within) + self.bias;
-        (0..last).find(|&level| ln(spp, level) >= now).unwrap_or(last)
+        (0..last).find(|&level| ln_spp(spp, level) >= now).unwrap_or(last)
     }
 
     /// This observer's own threshold of a tile, in ln(spp).
@@ -291,10 +282,6 @@ fn answer(question: &Question) -> String {
         QuestionKind::Choice => question.option.first().map_or_else(String::new, |o| o.id.clone()),
         QuestionKind::Text => "simulated".to_owned(),
     }
-}
-
-fn ln(spp: &[u64], level: u32) -> f64 {
-    (spp[level as usize].max(1) as f64).ln()
 }
 
 /// A second and a half for everything.

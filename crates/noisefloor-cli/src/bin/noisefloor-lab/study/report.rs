@@ -48,12 +48,12 @@ pub(super) fn say_all(report: &StudyReport) -> Result<(), NotSaid> {
     say_spread(report)?;
     say_groups(report)?;
     for c in &report.classes {
-        let [low, high] = c.identical.wilson.map(|v| 100.0 * v);
+        let [low, high] = [c.wilson_low, c.wilson_high].map(|v| 100.0 * v);
         let class = format!("{:?}", c.class).to_lowercase();
         say!(
             "{class:9} identical in {:.1} % of {} answers (95 % interval {low:.1} to {high:.1} %)",
-            100.0 * c.identical.share,
-            c.identical.of
+            100.0 * c.share,
+            c.answers
         )?;
     }
     Ok(())
@@ -64,13 +64,13 @@ fn say_tiles(report: &StudyReport) -> Result<(), NotSaid> {
         say!("{COLUMNS}   95 % interval")?;
     }
     for t in &report.tiles {
-        let interval = match t.level95_interval {
-            Some([low, high]) => format!("{low:.0} to {high:.0}"),
+        let interval = match t.level95_low.zip(t.level95_high) {
+            Some((low, high)) => format!("{low:.0} to {high:.0}"),
             None => format!("none: {} observers, fewer than {LEAST_OBSERVERS}", t.observers),
         };
-        let beyond = match t.level95_interval {
+        let beyond = match t.level95_high {
             _ if t.beyond => "  beyond the stack".to_owned(),
-            Some([_, high]) if high > t.reference as f64 => {
+            Some(high) if high > t.reference as f64 => {
                 format!("  wider than the stack, whose reference has {}", t.reference)
             }
             _ => String::new(),

@@ -36,7 +36,7 @@ pub(super) fn render(args: StackArgs) -> anyhow::Result<()> {
         (None, _) => Box::new(Ok),
         (_, Some(program)) => Box::new(move |pixels| {
             let made = program.apply(&LinearImage { width, height, pixels });
-            made.map(|image| image.pixels).map_err(|error| StudyError::StackRender(error.to_string()))
+            made.map(|image| image.pixels).map_err(|error| StudyError::Other(error.to_string()))
         }),
         (Some(_), None) => denoiser(source.as_mut(), job.first_hits_spp(), resources.timeout)?,
     };
@@ -72,6 +72,6 @@ fn denoiser<'a>(source: &mut dyn Source, rays: u64, timeout: Duration) -> anyhow
             None => picture,
         };
         let made = mean.denoise(&guided);
-        made.map_err(|error| StudyError::StackRender(one_line(&error.into())))
+        made.map_err(|error| StudyError::Other(one_line(&error.into())))
     }))
 }
