@@ -106,6 +106,13 @@ pub(crate) fn render(
     source.sample(&[Request::new(tile, 0, samples)]).unwrap().remove(0).mean
 }
 
+/// Asserts that something is refused, and that the message says so.
+#[track_caller]
+pub(crate) fn fails<T>(result: Result<T, impl Display>, want: &str) {
+    let error = result.err().unwrap_or_else(|| panic!("accepted, not: {want}")).to_string();
+    assert!(error.contains(want), "{error}\nwant: {want}");
+}
+
 /// Compares two colours to a relative tolerance.
 #[track_caller]
 pub(crate) fn close(got: Rgb, want: Rgb, tolerance: f32, what: &str) {

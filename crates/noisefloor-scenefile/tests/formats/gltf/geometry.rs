@@ -2,6 +2,7 @@
 //! it is.
 
 use super::kit::{Maker, assert_warns, drawing, json, load};
+use crate::util::fails;
 
 /// Shines to the front.
 const LAMP: &str = r#"{"emissiveFactor": [1, 1, 1]}"#;
@@ -254,8 +255,7 @@ fn skins_and_morph_targets_are_at_rest() {
     ] {
         let mut maker = maker.clone();
         maker.root["skins"][0][pointer] = json(&value);
-        let error = maker.load().unwrap_err().to_string();
-        assert!(error.contains(what), "{error}");
+        fails(maker.load(), what);
     }
 }
 
@@ -265,8 +265,7 @@ fn points_and_lines_alone_are_no_scene() {
     let mesh = maker.rectangle([-1.0, 1.0], [-1.0, 1.0], -1.0, "{}");
     maker.root["meshes"][mesh]["primitives"][0]["mode"] = 1.into();
     maker.node(&format!(r#"{{"mesh": {mesh}}}"#));
-    let error = maker.load().unwrap_err().to_string();
-    assert!(error.contains("a scene of only points and lines is not supported"), "{error}");
+    fails(maker.load(), "a scene of only points and lines is not supported");
 }
 
 /// Nodes share a mesh that is at rest, but for what shines in it and where a scale flattens it.

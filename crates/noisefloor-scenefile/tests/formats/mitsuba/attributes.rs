@@ -1,4 +1,4 @@
-use crate::util::{Folder, SKY, bsdf, close, rgb, value};
+use crate::util::{Folder, SKY, bsdf, close, fails, rgb, value};
 
 /// Two triangles side by side with a colour at their corners, and a weight on each.
 fn folder() -> Folder {
@@ -69,7 +69,6 @@ fn attributes_out_of_place_are_named() {
         (mesh(&masked), "an attribute of a mesh as this parameter is not supported"),
         (obj, "`vertex_color` of a mesh that is no PLY is not supported"),
     ] {
-        let error = folder.body(&body).unwrap_err();
-        assert!(error.contains(want), "{error}");
+        fails(folder.body(&body), want);
     }
 }

@@ -1,4 +1,4 @@
-use crate::util::{Folder, PINHOLE};
+use crate::util::{Folder, PINHOLE, fails};
 use noisefloor_scenefile::LoadOptions;
 
 #[test]
@@ -48,8 +48,7 @@ fn errors_say_where_and_what() {
         assert!(error.contains(want), "{world}\n{error}\nwant: {want}");
         assert!(error.contains(".pbrt"), "{error}");
     }
-    let part = folder.load_with("Shape 'sphere'", &LoadOptions::default()).unwrap_err();
-    assert!(part.contains("no WorldBegin"), "{part}");
+    fails(folder.load_with("Shape 'sphere'", &LoadOptions::default()), "no WorldBegin");
 }
 
 /// One load names all shapes that are wrong, and what is left out is warned of.
