@@ -20,19 +20,21 @@ const EACH_BYTE_OF_TREES: u64 = 32;
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
 /// Most bytes of all files, each counted as often as it is read.
 const MAX_BYTES: u64 = 1 << 34;
-/// What compressed data may become: so many bytes in any scene, and so many for each byte of its files. Deflate makes
-/// at most 1032 of one byte, but meshes at most some 30 (those of Draco). A limit on each part alone
-/// would let a short file name a part any number of times.
-const FREE_INFLATED: u64 = 1 << 26;
-const INFLATED_A_BYTE: u64 = 256;
-/// The same for pixels of pictures, of which deflate makes 344 from a byte if they are RGB.
-const FREE_PIXELS: u64 = 1 << 25;
-const PIXELS_A_BYTE: u64 = 512;
-/// Surfaces that any scene may have, and so many for each byte of its files: text has a triangle in some 30 bytes, of which
-/// three levels of subdivision make 64. A short file can name a mesh, a lamp in instances or other files any number of
-/// times.
-const FREE_SURFACES: u64 = 1 << 21;
-const SURFACES_A_BYTE: u64 = 2;
+
+/// How much of something a scene may have: so much any, and so much more for each byte of its files. A limit on each part
+/// alone would let a short file name a part any number of times.
+struct Allowance {
+    what: &'static str,
+    free: u64,
+    a_byte: u64,
+}
+
+/// What compressed data may become. Deflate makes at most 1032 bytes of one, but meshes at most some 30 (those of Draco).
+const INFLATED: Allowance = Allowance { what: "inflated bytes so far", free: 1 << 26, a_byte: 256 };
+/// Pixels, of which deflate makes 344 from a byte if they are RGB.
+const PIXELS: Allowance = Allowance { what: "pixels of pictures so far", free: 1 << 25, a_byte: 512 };
+/// Text has a triangle in some 30 bytes, of which three levels of subdivision make 64.
+const SURFACES: Allowance = Allowance { what: "surfaces so far", free: 1 << 21, a_byte: 2 };
 /// Most folders that a scene may add to those where its files are looked for.
 const MAX_FOLDERS: u64 = 64;
 
@@ -149,42 +151,36 @@ impl Folder {
 
     /// Counts bytes that compressed data becomes, before it does.
     pub(crate) fn inflate(&self, bytes: u64, place: &Place) -> Result<(), LoadError> {
-        self.inflated.set(self.inflated.get().saturating_add(bytes));
-        place.at_most("inflated bytes so far", self.inflated.get(), self.most_inflated())
+        self.count(&self.inflated, bytes, &INFLATED, place)
     }
 
     /// How many bytes compressed data may still become.
     pub(crate) fn left(&self) -> u64 {
-        self.most_inflated().saturating_sub(self.inflated.get())
-    }
-
-    fn most_inflated(&self) -> u64 {
-        self.distinct_bytes.get().saturating_mul(INFLATED_A_BYTE).saturating_add(FREE_INFLATED)
+        self.most(&INFLATED).saturating_sub(self.inflated.get())
     }
 
     /// Counts pixels of a picture, before they are decoded.
     pub(crate) fn draw(&self, pixels: u64, place: &Place) -> Result<(), LoadError> {
-        self.pixels.set(self.pixels.get().saturating_add(pixels));
-        let most = self.distinct_bytes.get().saturating_mul(PIXELS_A_BYTE).saturating_add(FREE_PIXELS);
-        place.at_most("pixels of pictures so far", self.pixels.get(), most)
+        self.count(&self.pixels, pixels, &PIXELS, place)
     }
 
     /// Counts surfaces, before or after they are made.
-    ///
-    /// # Errors
-    /// As [`Self::inflate`].
     pub(crate) fn build(&self, surfaces: u64, place: &Place) -> Result<(), LoadError> {
-        self.surfaces.set(self.surfaces.get().saturating_add(surfaces));
-        place.at_most("surfaces so far", self.surfaces.get(), self.most_surfaces())
+        self.count(&self.surfaces, surfaces, &SURFACES, place)
     }
 
     /// How many more surfaces there may be.
     pub(crate) fn unbuilt(&self) -> u64 {
-        self.most_surfaces().saturating_sub(self.surfaces.get())
+        self.most(&SURFACES).saturating_sub(self.surfaces.get())
     }
 
-    fn most_surfaces(&self) -> u64 {
-        self.distinct_bytes.get().saturating_mul(SURFACES_A_BYTE).saturating_add(FREE_SURFACES)
+    fn count(&self, sum: &Cell<u64>, more: u64, of: &Allowance, place: &Place) -> Result<(), LoadError> {
+        sum.set(sum.get().saturating_add(more));
+        place.at_most(of.what, sum.get(), self.most(of))
+    }
+
+    fn most(&self, of: &Allowance) -> u64 {
+        self.distinct_bytes.get().saturating_mul(of.a_byte).saturating_add(of.free)
     }
 
     /// Digests of all files that were read.

@@ -69,7 +69,7 @@ pub(crate) fn load(path: &Path, root: Option<&Path>) -> Result<Loaded, LoadError
         builder,
         materials: Materials::new(&asset),
         meshes: HashSet::new(),
-        nodes: rest::by_index(&placed),
+        nodes: placed.iter().map(|placed| (placed.index, placed.to_world)).collect(),
         skins: HashMap::new(),
         sharing,
         shared: HashMap::new(),

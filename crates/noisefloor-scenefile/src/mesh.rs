@@ -224,6 +224,16 @@ pub(crate) fn rows(to_world: DMat4) -> [[f64; 4]; 3] {
     [0, 1, 2].map(|i| to_world.row(i).to_array())
 }
 
+/// The directions of x, y and z.
+pub(crate) fn axes(to_world: DMat4) -> [DVec3; 3] {
+    [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate().normalize_or_zero())
+}
+
+/// The rows of a rotation, as maps of the surroundings take them.
+pub(crate) fn rotation(to_world: DMat3) -> [[f32; 3]; 3] {
+    to_world.transpose().to_cols_array_2d().map(|row| row.map(|x| x as f32))
+}
+
 /// The matrix that takes normals along: the inverse transpose, but for a positive
 /// factor. Computed from cofactors, so that singular transforms work.
 pub(crate) fn normal_matrix(to_world: DMat3) -> DMat3 {

@@ -1,5 +1,6 @@
 //! Clear skies with a sun (Hošek and Wilkie 2012), as environment maps.
 
+use crate::mesh::rotation;
 use glam::{DMat3, DVec3};
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 use noisefloor::Rgb;
@@ -58,10 +59,9 @@ impl ClearSky {
         if self.scales[1] > 0.0 {
             self.add_sun(sun, elevation.to_degrees(), &mut pixels);
         }
-        let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.as_vec3());
         // The map's own axes: its +y is the sky's +z, its +z the sky's −y
-        let rows = [[x.x, z.x, -y.x], [x.y, z.y, -y.y], [x.z, z.z, -y.z]];
-        Ok(EnvironmentMap { width: WIDTH, height: HEIGHT, pixels, to_world: rows, poles: false })
+        let to_world = rotation(DMat3::from_cols(to_world.x_axis, to_world.z_axis, -to_world.y_axis));
+        Ok(EnvironmentMap { width: WIDTH, height: HEIGHT, pixels, to_world, poles: false })
     }
 
     /// Adds the sun's disk: what it gives off in all is exact, its outline as fine as the pixels.

@@ -8,8 +8,9 @@ use super::parts::{INSTANCES, VISIBILITY, name};
 use super::rest::{self, Joints};
 use super::shared::Shared;
 use super::{camera, light};
+use crate::mesh::rows;
 use crate::{LoadError, Place};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat4, DVec3};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::{self, Index, Skin};
 use noisefloor_ptwne::{Camera, Mesh, SceneBuilder, SceneError};
@@ -225,12 +226,7 @@ impl Loader<'_> {
                 shared
             }
         };
-        let DAffine3 { matrix3, translation } = *to_world;
-        let rows = [0, 1, 2].map(|i| {
-            let [x, y, z] = matrix3.row(i).to_array();
-            [x, y, z, translation[i]]
-        });
-        match self.builder.instance(shared.object, rows) {
+        match self.builder.instance(shared.object, rows(DMat4::from(*to_world))) {
             Err(SceneError::Singular) => return Ok(None),
             shown => shown.map_err(place.refused())?,
         }
@@ -286,7 +282,7 @@ impl Pose<'_> {
         {
             return Ok(());
         }
-        triangles.place(self.to_world);
+        triangles.place(std::iter::repeat(self.to_world));
         Ok(())
     }
 }

@@ -152,48 +152,22 @@ fn assemble(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
 }
 
 impl Triangles {
-    /// Moves the triangles to where a node is in the world.
-    pub(super) fn place(&mut self, to_world: &DAffine3) {
-        for p in &mut self.positions {
-            *p = moved(*p, to_world);
+    /// Moves each vertex to the world, by a transform of its own or by that of its node, which then repeats.
+    pub(super) fn place<'m>(&mut self, mut moves: impl Iterator<Item = &'m DAffine3> + Clone) {
+        for (p, to_world) in self.positions.iter_mut().zip(moves.clone()) {
+            *p = to_world.transform_point3(DVec3::from_array(p.map(f64::from))).as_vec3().to_array();
         }
-        let matrix = normal_matrix(to_world.matrix3);
-        for n in &mut self.normals {
-            *n = turned(*n, &matrix);
+        for (n, to_world) in self.normals.iter_mut().zip(moves.clone()) {
+            let turned = normal_matrix(to_world.matrix3) * DVec3::from_array(n.map(f64::from));
+            *n = turned.normalize_or_zero().as_vec3().to_array();
         }
-        for tangent in &mut self.tangents {
+        for (tangent, to_world) in self.tangents.iter_mut().zip(moves.clone()) {
             *tangent = turned_tangent(*tangent, &to_world.matrix3);
         }
-        if to_world.matrix3.determinant() < 0.0 {
-            self.mirror();
+        if moves.next().is_some_and(|to_world| to_world.matrix3.determinant() < 0.0) {
+            self.indices.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
     }
-
-    /// Moves each vertex by its own transform.
-    pub(super) fn place_each(&mut self, moves: &[DAffine3]) {
-        for (p, to_world) in self.positions.iter_mut().zip(moves) {
-            *p = moved(*p, to_world);
-        }
-        for (n, to_world) in self.normals.iter_mut().zip(moves) {
-            *n = turned(*n, &normal_matrix(to_world.matrix3));
-        }
-        for (tangent, to_world) in self.tangents.iter_mut().zip(moves) {
-            *tangent = turned_tangent(*tangent, &to_world.matrix3);
-        }
-        if moves.first().is_some_and(|to_world| to_world.matrix3.determinant() < 0.0) {
-            self.mirror();
-        }
-    }
-
-    fn mirror(&mut self) {
-        for [_, b, c] in &mut self.indices {
-            std::mem::swap(b, c);
-        }
-    }
-}
-
-fn turned(n: [f32; 3], matrix: &DMat3) -> [f32; 3] {
-    (*matrix * DVec3::from_array(n.map(f64::from))).normalize_or_zero().as_vec3().to_array()
 }
 
 /// A tangent goes along with the surface. In a mirror image, so does the bitangent, where the cross product
@@ -202,11 +176,6 @@ fn turned_tangent([x, y, z, side]: [f32; 4], to_world: &DMat3) -> [f32; 4] {
     let t = (*to_world * DVec3::from_array([x, y, z].map(f64::from))).normalize_or_zero().as_vec3();
     let side = if (side < 0.0) != (to_world.determinant() < 0.0) { -1.0 } else { 1.0 };
     [t.x, t.y, t.z, side]
-}
-
-/// A point in the world.
-pub(super) fn moved(p: [f32; 3], to_world: &DAffine3) -> [f32; 3] {
-    to_world.transform_point3(DVec3::from_array(p.map(f64::from))).as_vec3().to_array()
 }
 
 #[cfg(test)]

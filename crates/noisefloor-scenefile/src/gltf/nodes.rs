@@ -4,7 +4,7 @@ use super::accessor::floats;
 use super::asset::Asset;
 use super::parts::{INSTANCES, VISIBILITY, name};
 use crate::{LoadError, Place};
-use glam::{DAffine3, DMat3, DQuat, DVec3};
+use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Accessor, Index, Node, Value};
 
 /// A node in its place in the world.
@@ -65,12 +65,15 @@ pub(super) fn placed<'a>(asset: &'a Asset<'a>) -> Result<Vec<Placed<'a>>, LoadEr
 
 fn local(node: &Node) -> Option<DAffine3> {
     if let Some(matrix) = node.matrix {
-        let [x, y, z, w]: [DVec3; 4] =
-            std::array::from_fn(|i| DVec3::from_array(std::array::from_fn(|j| f64::from(matrix[4 * i + j]))));
-        return Some(DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), w));
+        return Some(affine(matrix));
     }
     let rotation = node.rotation.unwrap_or_default().0;
     composed(node.translation.unwrap_or([0.0; 3]), rotation, node.scale.unwrap_or([1.0; 3]))
+}
+
+/// A matrix column by column, whose last row is 0 0 0 1.
+pub(super) fn affine(matrix: [f32; 16]) -> DAffine3 {
+    DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from)))
 }
 
 /// Scaled, rotated and moved; none if that is no rotation.

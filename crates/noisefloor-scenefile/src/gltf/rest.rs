@@ -4,7 +4,7 @@
 use super::accessor::floats;
 use super::asset::Asset;
 use super::mesh::{Triangles, attribute};
-use super::nodes::Placed;
+use super::nodes::affine;
 use super::parts::name;
 use crate::{LoadError, Place};
 use glam::{DAffine3, DMat3, DVec3};
@@ -41,15 +41,9 @@ pub(super) fn joints(
         asset.get(*joint, "node", &here)?;
         let outside = || here.bad(format_args!("its joint {} is not in the scene", joint.value()));
         let to_world = nodes.get(&joint.value()).copied().ok_or_else(outside)?;
-        Ok(to_world * inverse.get(number).map_or(DAffine3::IDENTITY, |m| affine(m.map(f64::from))))
+        Ok(to_world * inverse.get(number).map_or(DAffine3::IDENTITY, |m| affine(*m)))
     };
     skin.joints.iter().enumerate().map(joint).collect()
-}
-
-/// A matrix column by column, whose last row is 0 0 0 1.
-fn affine(m: [f64; 16]) -> DAffine3 {
-    let column = |i: usize| DVec3::new(m[4 * i], m[4 * i + 1], m[4 * i + 2]);
-    DAffine3::from_mat3_translation(DMat3::from_cols(column(0), column(1), column(2)), column(3))
 }
 
 /// Moves the vertices of a primitive by their joints. The result is whether they have any.
@@ -82,7 +76,7 @@ pub(super) fn skin(
         let by = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         moves.push(DAffine3::from_mat3_translation(matrix * by, shift * by));
     }
-    triangles.place_each(&moves);
+    triangles.place(moves.iter());
     Ok(true)
 }
 
@@ -130,9 +124,4 @@ fn rows<const N: usize>(
         return Err(place.bad(what));
     }
     floats(asset, index, place)
-}
-
-/// Where each node is, by its index.
-pub(super) fn by_index(placed: &[Placed<'_>]) -> HashMap<usize, DAffine3> {
-    placed.iter().map(|placed| (placed.index, placed.to_world)).collect()
 }

@@ -2,13 +2,13 @@
 //! names, points and transforms.
 
 use super::document::{Document, unset};
-use super::parts::{Attribute, Raster, Surface};
+use super::parts::{Attribute, Surface};
 use super::xml::Element;
 use crate::error::{LoadError, Place};
 use crate::load::Load;
 use crate::options::{LoadOptions, NO_MEDIA};
 use glam::{DMat3, DMat4, DVec3};
-use noisefloor_ptwne::{Facets, Material, SceneError, Texture};
+use noisefloor_ptwne::{Facets, ImageTexture, Material, SceneError, Texture};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::fmt;
@@ -44,7 +44,7 @@ pub(super) struct Context<'d> {
     pub(super) load: &'d Load,
     pub(super) options: &'d LoadOptions,
     /// Pictures that have been read, by file and whether their codes are linear.
-    pub(super) rasters: RefCell<HashMap<(PathBuf, bool), Raster>>,
+    pub(super) rasters: RefCell<HashMap<(PathBuf, bool), ImageTexture>>,
     /// Surfaces that have been read, by the serial number of their element.
     pub(super) surfaces: RefCell<HashMap<usize, Surface>>,
     /// Textures that have been read, by the serial number of their element and whether they are light.

@@ -2,13 +2,16 @@
 
 use super::context::Context;
 use super::xml::Element;
+use crate::channels::linear;
 use crate::colour::Quantity;
 use crate::error::LoadError;
+use crate::mesh::{axes, rotation};
 use crate::sky::{ClearSky, SUN_DIAMETER, TURBIDITIES};
 use glam::{DMat3, DVec3};
 use noisefloor::Rgb;
 use noisefloor_ptwne::{
-    Emission, Environment, EnvironmentMap, Falloff, FovAxis, Profile, Punctual, SceneBuilder, Texture,
+    Emission, Environment, EnvironmentMap, Falloff, FovAxis, ImageTexture, Profile, Punctual, SceneBuilder,
+    Texture,
 };
 
 impl<'d> Context<'d> {
@@ -68,13 +71,8 @@ impl<'d> Context<'d> {
         element.ignore(&["sampling_weight"]);
         match element.kind() {
             "area" => {}
-            "point" | "spot" | "projector" | "directional" => {
+            "point" | "spot" | "projector" | "directional" | "collimated" => {
                 self.emitter(element, builder)?;
-                return Ok(None);
-            }
-            "collimated" => {
-                element.irrelevant();
-                self.ignored(element, "the beam is ignored: it lights a single point");
                 return Ok(None);
             }
             _ => return Err(self.unsupported(element, format!("{} in a shape", element.label()))),
@@ -100,7 +98,7 @@ impl<'d> Context<'d> {
         let to_world = self.transform(element, "to_world")?;
         let position = self.point(element, "position")?.unwrap_or(to_world.w_axis.truncate());
         let direction = self.point(element, "direction")?.unwrap_or(to_world.z_axis.truncate());
-        Ok((position.as_vec3().to_array(), direction.normalize_or_zero().as_vec3().to_array()))
+        Ok((array(position), array(direction.normalize_or_zero())))
     }
 
     /// `sky`, `sun` or `sunsky`, of version 0.6, where +y is up, and of version 3, where +z is.
@@ -136,11 +134,8 @@ impl<'d> Context<'d> {
         if scales[1] > 0.0 {
             self.approximated(element, "the sun is drawn into a map of the sky");
         }
-        let matrix = DMat3::from_mat4(self.transform(element, "to_world")?);
-        let matrix = DMat3::from_cols_array_2d(
-            &matrix.to_cols_array_2d().map(|column| DVec3::from_array(column).normalize_or_zero().to_array()),
-        );
-        sky.map(matrix * up.transpose()).map_err(|what| self.bad(element, what))
+        let [x, y, z] = axes(self.transform(element, "to_world")?);
+        sky.map(DMat3::from_cols(x, y, z) * up.transpose()).map_err(|what| self.bad(element, what))
     }
 
     /// Towards the sun: `sun_direction`, or where it stands at a place and time.
@@ -174,8 +169,8 @@ impl<'d> Context<'d> {
     fn environment_map(&self, element: &'d Element) -> Result<EnvironmentMap, LoadError> {
         let name = self.string(element, "filename")?;
         let name = name.ok_or_else(|| self.bad(element, "an envmap needs a `filename`"))?;
-        let raster = self.raster(element, name, false)?;
-        let (width, height, mut pixels) = raster.linear();
+        let ImageTexture { width, height, pixels, .. } = self.raster(element, name, false)?;
+        let mut pixels = linear(&pixels);
         self.count_pixels(element, pixels.len())?;
 
         // Brightness
@@ -195,14 +190,12 @@ impl<'d> Context<'d> {
         }
 
         // Directions; a mirrored map is a mirrored picture, turned
-        let matrix = DMat3::from_mat4(self.transform(element, "to_world")?);
-        let mut axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::normalize_or_zero);
-        if axes[0].cross(axes[1]).dot(axes[2]) < 0.0 {
-            axes[0] = -axes[0];
+        let [mut x, y, z] = axes(self.transform(element, "to_world")?);
+        if x.cross(y).dot(z) < 0.0 {
+            x = -x;
             pixels.chunks_exact_mut(width).for_each(<[Rgb]>::reverse);
         }
-        let [x, y, z] = axes.map(|axis| axis.as_vec3());
-        let to_world = [[x.x, y.x, z.x], [x.y, y.y, z.y], [x.z, y.z, z.z]];
+        let to_world = rotation(DMat3::from_cols(x, y, z));
         let poles = !self.document.old;
         Ok(EnvironmentMap { width, height, pixels, to_world, poles })
     }
@@ -228,7 +221,7 @@ impl<'d> Context<'d> {
         };
         // The picture spans the cone
         let (peak, picture) = self.picture(texture)?;
-        let [x, y, z] = self.axes(element)?;
+        let [x, y, z] = axes(self.transform(element, "to_world")?).map(array);
         let profile = Profile::Spot { inner, outer, falloff };
         let extent = [outer.to_radians().tan(); 2];
         let intensity = intensity.map(|c| c * peak);
@@ -257,7 +250,7 @@ impl<'d> Context<'d> {
         let extent = [wide as f32, (wide / aspect) as f32];
         let intensity = light.map(|c| c * scale * std::f32::consts::PI);
         // The picture's u runs along −x, as that of a camera does
-        let [x, y, z] = self.axes(element)?;
+        let [x, y, z] = axes(self.transform(element, "to_world")?).map(array);
         let axes = [x.map(|c| -c), y, z];
         let profile = Profile::EvenPlane;
         let projector = Punctual::Projector { position, axes, extent, intensity, profile };
@@ -283,11 +276,8 @@ impl<'d> Context<'d> {
             _ => half,
         })
     }
+}
 
-    /// The directions of x, y and z of an emitter.
-    fn axes(&self, element: &'d Element) -> Result<[[f32; 3]; 3], LoadError> {
-        let matrix = DMat3::from_mat4(self.transform(element, "to_world")?);
-        let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
-        Ok(axes.map(|axis| axis.normalize_or_zero().as_vec3().to_array()))
-    }
+fn array(v: DVec3) -> [f32; 3] {
+    v.as_vec3().to_array()
 }

@@ -1,8 +1,6 @@
 //! Parts of a scene that several readers share.
 
-use crate::channels::linear;
-use noisefloor::Rgb;
-use noisefloor_ptwne::{Facets, Material, Pixels, Relief, Texture};
+use noisefloor_ptwne::{Facets, Material, Relief, Texture};
 
 /// A material, or a blend of two surfaces, and what it lets through.
 #[derive(Clone, Debug)]
@@ -114,19 +112,4 @@ pub(super) struct Attribute {
     /// With `vertex_` or `face_` in front.
     pub(super) name: String,
     pub(super) scale: f64,
-}
-
-/// A picture, ready for textures.
-#[derive(Clone, Debug)]
-pub(super) struct Raster {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) pixels: Pixels,
-}
-
-impl Raster {
-    /// Width, height, and linear values.
-    pub(super) fn linear(&self) -> (usize, usize, Vec<Rgb>) {
-        (self.width, self.height, linear(&self.pixels))
-    }
 }

@@ -101,21 +101,16 @@ impl<'d> Context<'d> {
             "sample_border",
             "banner",
         ]);
-        let edge = |name: &str, default: usize| match self.integer(film, name)? {
+        let pixels = |name: &str, least: i64, default: usize| match self.integer(film, name)? {
             None => Ok(default),
-            Some(edge @ 1..=MAX_EDGE) => Ok(edge as usize),
-            Some(_) => Err(self.bad(film, format!("`{name}` is not in 1…{MAX_EDGE}"))),
+            Some(pixels) if (least..=MAX_EDGE).contains(&pixels) => Ok(pixels as usize),
+            Some(_) => Err(self.bad(film, format!("`{name}` is not in {least}…{MAX_EDGE}"))),
         };
-        let whole = (edge("width", DEFAULT_SIZE.0)?, edge("height", DEFAULT_SIZE.1)?);
-        let offset = |name: &str| match self.integer(film, name)? {
-            None => Ok(0),
-            Some(offset @ 0..=MAX_EDGE) => Ok(offset as usize),
-            Some(_) => Err(self.bad(film, format!("`{name}` is not in 0…{MAX_EDGE}"))),
-        };
-        let (x, y) = (offset("crop_offset_x")?, offset("crop_offset_y")?);
+        let whole = (pixels("width", 1, DEFAULT_SIZE.0)?, pixels("height", 1, DEFAULT_SIZE.1)?);
+        let (x, y) = (pixels("crop_offset_x", 0, 0)?, pixels("crop_offset_y", 0, 0)?);
         let shown = (
-            edge("crop_width", whole.0.saturating_sub(x).max(1))?,
-            edge("crop_height", whole.1.saturating_sub(y).max(1))?,
+            pixels("crop_width", 1, whole.0.saturating_sub(x).max(1))?,
+            pixels("crop_height", 1, whole.1.saturating_sub(y).max(1))?,
         );
         let share = |from: usize, size: usize, of: usize| [from, from + size].map(|at| at as f64 / of as f64);
         Ok((Some(FilmSize { whole, shown }), [share(x, shown.0, whole.0), share(y, shown.1, whole.1)]))

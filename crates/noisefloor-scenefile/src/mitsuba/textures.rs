@@ -1,9 +1,8 @@
 //! Textures.
 
 use super::context::Context;
-use super::parts::Raster;
 use super::xml::Element;
-pub(super) use crate::channels::linear;
+use crate::channels::{self, linear};
 use crate::colour::Quantity;
 use crate::error::LoadError;
 use crate::picture::{self, Picture};
@@ -178,9 +177,7 @@ impl<'d> Context<'d> {
             }
             Texture::Image(image) => {
                 self.count_pixels(element, image.width * image.height)?;
-                let larger = |p: Rgb| std::array::from_fn(|i| (p[i] * image.factor[i] * scale).min(1.0));
-                let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(larger).collect());
-                Texture::Image(ImageTexture { pixels, factor: [1.0; 3], ..image })
+                Texture::Image(channels::mapped(&image, |p| p.map(|c| (c * scale).min(1.0))))
             }
             other => self.tinted_corners(element, other, [scale; 3])?,
         })
@@ -195,8 +192,8 @@ impl<'d> Context<'d> {
             None => self.boolean(element, "raw", false)?,
         };
         element.ignore(&["max_anisotropy", "cache", "mipmap", "format"]);
-        let Raster { width, height, pixels } = self.raster(element, name, raw)?;
-        let (scale, pixels) = self.fit(element, pixels, quantity)?;
+        let image = self.raster(element, name, raw)?;
+        let (scale, pixels) = self.fit(element, image.pixels, quantity)?;
 
         let nearest = match self.string(element, "filter_type")?.unwrap_or("bilinear") {
             "nearest" => true,
@@ -214,8 +211,7 @@ impl<'d> Context<'d> {
             }
         };
         let to_uv = self.to_uv(element)?;
-        let image = ImageTexture::new(width, height, pixels);
-        Ok((scale, ImageTexture { to_uv, wrap: [wrap; 2], nearest, ..image }))
+        Ok((scale, ImageTexture { pixels, to_uv, wrap: [wrap; 2], nearest, ..image }))
     }
 
     /// Brings the pixels of a picture into 0…1: those of factors are clamped, lights are scaled.
@@ -289,7 +285,7 @@ impl<'d> Context<'d> {
     }
 
     /// The picture called `name`. Codes of 8 and 16 bits are sRGB-encoded unless `raw`.
-    pub(super) fn raster(&self, element: &Element, name: &str, raw: bool) -> Result<Raster, LoadError> {
+    pub(super) fn raster(&self, element: &Element, name: &str, raw: bool) -> Result<ImageTexture, LoadError> {
         let place = &self.place(element);
         let path = self.load.folder.find(name, place)?;
         let key = (path, raw);
@@ -298,10 +294,9 @@ impl<'d> Context<'d> {
         }
         let Picture { width, height, samples } = picture::read(&self.load.folder, &key.0, place)?;
         self.count_pixels(element, width * height)?;
-        let pixels = samples.pixels(raw);
-        let raster = Raster { width, height, pixels };
-        self.rasters.borrow_mut().insert(key, raster.clone());
-        Ok(raster)
+        let image = ImageTexture::new(width, height, samples.pixels(raw));
+        self.rasters.borrow_mut().insert(key, image.clone());
+        Ok(image)
     }
 }
 

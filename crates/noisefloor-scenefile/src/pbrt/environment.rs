@@ -1,18 +1,28 @@
 //! Maps of surroundings: pbrt's z points up.
 
-use glam::DMat3;
-use glam::DVec3;
+use crate::mesh::rotation;
+use glam::{DMat3, DVec3};
 use noisefloor::Rgb;
 use noisefloor_ptwne::EnvironmentMap;
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 
 /// A map of latitudes and longitudes, of pbrt 3: φ = 0 at +x on the left, θ = 0 at +z on top.
-pub(super) fn latitudes(width: usize, height: usize, pixels: Vec<Rgb>, rotation: DMat3) -> EnvironmentMap {
-    EnvironmentMap { width, height, pixels, to_world: rows(rotation), poles: false }
+///
+/// The map sees (x, y, z) at u = atan2(x, −z)/2π, with +y on top; pbrt at u = atan2(y, x)/2π, with +z on top: its x is
+/// the map's −z, its y the map's x, its z the map's y.
+pub(super) fn latitudes(
+    width: usize,
+    height: usize,
+    pixels: Vec<Rgb>,
+    [x, y, z]: [DVec3; 3],
+) -> EnvironmentMap {
+    let own = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::NEG_X);
+    let to_world = rotation(DMat3::from_cols(x, y, z) * own);
+    EnvironmentMap { width, height, pixels, to_world, poles: false }
 }
 
-/// A square map of equal areas (Clarberg 2008), of pbrt 4, as one of latitudes and longitudes.
-pub(super) fn equal_area(side: usize, square: &[Rgb], rotation: DMat3) -> EnvironmentMap {
+/// The pixels of a square map of equal areas (Clarberg 2008), of pbrt 4, as one of latitudes and longitudes.
+pub(super) fn equal_area(side: usize, square: &[Rgb]) -> Vec<Rgb> {
     let (width, height) = (2 * side, side);
     let mut pixels = Vec::with_capacity(width * height);
     for row in 0..height {
@@ -24,15 +34,7 @@ pub(super) fn equal_area(side: usize, square: &[Rgb], rotation: DMat3) -> Enviro
             pixels.push(square[at(v) * side + at(u)]);
         }
     }
-    EnvironmentMap { width, height, pixels, to_world: rows(rotation), poles: false }
-}
-
-/// The rotation from a map's own axes to the world. The map sees (x, y, z) at u = atan2(x, −z)/2π, with +y on
-/// top; pbrt at u = atan2(y, x)/2π, with +z on top: its x is the map's −z, its y the map's x, its z the map's
-/// y.
-fn rows(rotation: DMat3) -> [[f32; 3]; 3] {
-    let own = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::NEG_X);
-    (rotation * own).transpose().to_cols_array_2d().map(|row| row.map(|x| x as f32))
+    pixels
 }
 
 /// Where in the unit square a direction of length 1 is seen.

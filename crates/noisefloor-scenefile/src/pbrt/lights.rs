@@ -6,8 +6,9 @@ use super::reader::Reader;
 use super::state::AreaLight;
 use crate::channels::linear;
 use crate::error::LoadError;
+use crate::mesh::axes;
 use crate::picture;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use noisefloor::{Rgb, display::luminance};
 use noisefloor_ptwne::{Emission, Environment, Falloff, ImageTexture, Pixels, Punctual, Texture, Wrap};
 use std::f64::consts::PI;
@@ -82,18 +83,13 @@ impl Reader<'_> {
         for pixel in &mut pixels {
             *pixel = std::array::from_fn(|i| (f64::from(pixel[i] * radiance[i]) * by).max(0.0) as f32);
         }
-        let rotation = DMat3::from_mat4(self.state.to_world);
-        let rotation = DMat3::from_cols(
-            rotation.x_axis.normalize_or_zero(),
-            rotation.y_axis.normalize_or_zero(),
-            rotation.z_axis.normalize_or_zero(),
-        );
-        let map = if width == height {
+        let (width, pixels) = if width == height {
             self.load.count_pixels(&params.place, 2 * width * height)?;
-            environment::equal_area(width, &pixels, rotation)
+            (2 * width, environment::equal_area(width, &pixels))
         } else {
-            environment::latitudes(width, height, pixels, rotation)
+            (width, pixels)
         };
+        let map = environment::latitudes(width, height, pixels, axes(self.state.to_world));
         self.builder.environment_map(map).map_err(refused)
     }
 

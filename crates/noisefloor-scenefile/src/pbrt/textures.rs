@@ -3,7 +3,7 @@
 use super::params::Params;
 use super::reader::Reader;
 use super::state::{Definition, Height, plain};
-use crate::channels::{self, linear};
+use crate::channels;
 use crate::error::{LoadError, Place};
 use crate::picture::{self, Samples};
 use noisefloor::Rgb;
@@ -216,10 +216,8 @@ impl Reader<'_> {
         let scale = params.float("scale")?.unwrap_or(1.0) as f32;
         if params.switch("invert", false)? {
             self.load.count_pixels(&params.place, count)?;
-            let inverse = |p: Rgb| p.map(|c| (scale * (1.0 - c)).clamp(0.0, 1.0));
-            let height = Height { map: image.clone(), scale: -scale };
-            let pixels = Pixels::Float(linear(&image.pixels).into_iter().map(inverse).collect());
-            return Ok((Texture::Image(ImageTexture { pixels, ..image }), height));
+            let inverse = channels::mapped(&image, |p| p.map(|c| scale * (1.0 - c)));
+            return Ok((Texture::Image(inverse), Height { map: image, scale: -scale }));
         }
         let height = Height { map: image.clone(), scale };
         let factor = [scale.max(0.0); 3];
