@@ -123,11 +123,25 @@ def rivals():
             factor(found[name]["scores"]["bias_factor"]), share(found[name]["scores"]["early_share"])] for name, title in names.items()])
 
 
+def judged():
+    """Of each scene that people judged: its name, the last picture and an earlier one with at most a third of its samples, each as
+    floats from 0 to 1 and its samples, and its zones. Needs numpy and pillow."""
+    import numpy as np
+    from PIL import Image
+    read = lambda path: np.asarray(Image.open(path).convert("RGB"), dtype=float) / 255
+    for folder in ("lisic9", "lisic-two"):
+        rows = list(csv.DictReader(open(HUMAN / folder / "thresholds.csv")))
+        for scene in sorted({r["scene"] for r in rows}):
+            pictures = {int(path.stem): path for path in (HUMAN / folder / scene).glob("*.png")}
+            many = max(pictures)
+            n = max(spp for spp in pictures if spp <= many / 3)
+            yield scene, read(pictures[many]), many, read(pictures[n]), n, [r for r in rows if r["scene"] == scene]
+
+
 def same_numbers():
     """Plain measures of noise from the PNGs, by themselves and with noisefloor's two numbers of the picture; no code of the project.
     Needs numpy and pillow."""
     import numpy as np
-    from PIL import Image
     weights = np.array([0.2126, 0.7152, 0.0722])
     linear = lambda a: np.where(a <= 0.04045, a / 12.92, ((a + 0.055) / 1.055) ** 2.4)
     measures = {
@@ -136,23 +150,16 @@ def same_numbers():
         "relative squared error of red, green and blue": lambda a, b: ((linear(a) - linear(b)) ** 2 / (linear(b) ** 2 + 0.01)).mean(-1),
     }
     zones = []
-    for folder in ("lisic9", "lisic-two"):
-        rows = list(csv.DictReader(open(HUMAN / folder / "thresholds.csv")))
-        for scene in sorted({r["scene"] for r in rows}):
-            files = sorted((HUMAN / folder / scene).glob("*.png"), key=lambda p: int(p.stem))
-            read = lambda p: np.asarray(Image.open(p).convert("RGB"), dtype=float) / 255
-            last, many = read(files[-1]), int(files[-1].stem)
-            early = [p for p in files if int(p.stem) <= many / 3][-1]
-            picture, n = read(early), int(early.stem)
-            fields = {name: of(picture, last) / (1 / n - 1 / many) for name, of in measures.items()}
-            light = math.log(linear(last @ weights).mean() + 0.002)
-            for r in (r for r in rows if r["scene"] == scene):
-                x, y, w, h = (int(r[k]) for k in ("x", "y", "width", "height"))
-                human = min(float(r["human_spp"]), 0.999 * many)
-                zones.append({"scene": scene, "group": scene[:3], "human": float(r["human_spp"]), "many": many, "light": light,
-                              # The last picture contains the samples of the earlier ones
-                              "goal": -math.log(1 / human - 1 / many), "range": (float(r["first_spp"]), float(r["last_spp"])),
-                              **{name: math.log(field[y:y + h, x:x + w].mean()) for name, field in fields.items()}})
+    for scene, last, many, picture, n, of_scene in judged():
+        fields = {name: of(picture, last) / (1 / n - 1 / many) for name, of in measures.items()}
+        light = math.log(linear(last @ weights).mean() + 0.002)
+        for r in of_scene:
+            x, y, w, h = (int(r[k]) for k in ("x", "y", "width", "height"))
+            human = min(float(r["human_spp"]), 0.999 * many)
+            zones.append({"scene": scene, "group": scene[:3], "human": float(r["human_spp"]), "many": many, "light": light,
+                          # The last picture contains the samples of the earlier ones
+                          "goal": -math.log(1 / human - 1 / many), "range": (float(r["first_spp"]), float(r["last_spp"])),
+                          **{name: math.log(field[y:y + h, x:x + w].mean()) for name, field in fields.items()}})
     rows = []
     for name in measures:
         cells = []
@@ -240,7 +247,7 @@ def people_lost():
     import look
     rows, of_scenes = [], []
     between = lambda values: f"({min(values):.2f} to {max(values):.2f})"
-    for scene, contrasts, crops, zones in look.people(HUMAN):
+    for scene, contrasts, crops, zones in look.people(judged()):
         means = statistics.geometric_mean(contrasts), statistics.mean(crops), statistics.mean(zones)
         rows.append([scene, f"{means[0]:.2f} {between(contrasts)}", f"{means[1]:.2f} {between(crops)}", f"{means[2]:.2f}"])
         of_scenes.append(means)

@@ -1,27 +1,26 @@
 #!/usr/bin/env python3
 """What the oracle costs beside a GPU, in milliseconds a pass and in wall time until the stop.
 
-    python3 benchmarks/gpu.py [--sizes 1920x1080,3840x2160] [--renderers cuda,cornell] [--tile 64] [--limit 2048]
-
-Needs a machine with an NVIDIA card, the module `noisefloor`, and CuPy (`cuda`) or Mitsuba 3 (`cornell`, or the path of a
-scene of Mitsuba).
+Needs a machine with an NVIDIA card, the module `noisefloor`, CuPy, Mitsuba 3, and the scenes beside the human data.
 
 The first table has what a pass takes: rendering 16 samples of each pixel, copying them from the card, pushing and judging
 them, in a loop that does one after the other. The second has wall times. Each renderer and size is rendered until all tiles
 stop, beside a session that waits for each verdict and beside one in the background, and then alone, with the passes of each.
 """
 
-import argparse
-import itertools
-import os
-import subprocess
 import time
 
 import numpy as np
 
 import noisefloor
-from figures import table
+from figures import HUMAN, table
 
+# Renderers and sizes, as the ledger calls them, and the samples per pixel at which every tile stops in the second table.
+CUDA, CORNELL = "CUDA, 60 lines", "Mitsuba, Cornell box"
+CASES = {(CUDA, 1920, 1080): 2048, (CUDA, 3840, 2160): 2048, (CORNELL, 1920, 1080): 512, (CORNELL, 3840, 2160): 192,
+         ("Mitsuba, modern-hall", 1920, 1080): 192}
+# Tiles of both, and the samples at which those of the first stop.
+TILE, LIMIT = 64, 2048
 # Samples of each pixel in one call, and in a pass of the first table.
 AT_ONCE, PASS = 4, 16
 # Seconds after which the first table has seen enough passes.
@@ -79,7 +78,7 @@ extern "C" __global__ void trace(float *mean, int width, int height, int spp, un
 
 def renderer(kind, width, height):
     """A function of (spp, seed) that returns an array on the device when it is done; `fetch` of it brings one to memory."""
-    if kind == "cuda":
+    if kind == CUDA:
         import cupy
         import cupyx
         trace = cupy.RawKernel(KERNEL, "trace", options=("--std=c++14",))
@@ -96,12 +95,12 @@ def renderer(kind, width, height):
     import drjit
     import mitsuba
     mitsuba.set_variant("cuda_ad_rgb")
-    if kind == "cornell":
+    if kind == CORNELL:
         scene = mitsuba.cornell_box()
         scene["sensor"]["film"] |= {"width": width, "height": height, "rfilter": {"type": "box"}}
         scene = mitsuba.load_dict(scene)
     else:
-        scene = mitsuba.load_file(kind)
+        scene = mitsuba.load_file(str(HUMAN.parent / "scenes/modern-hall/scene.xml"))
         size = mitsuba.traverse(scene.sensors()[0])
         size["film.size"] = [width, height]
         size.update()
@@ -112,12 +111,6 @@ def renderer(kind, width, height):
         drjit.sync_thread()
     render.evaluate, render.fetch = evaluate, np.asarray
     return render
-
-
-def named(kind, width, height):
-    """As the ledger calls a renderer and a size."""
-    known = {"cuda": "CUDA, 60 lines", "cornell": "Mitsuba, Cornell box"}
-    return f"{known.get(kind) or 'Mitsuba, ' + os.path.basename(os.path.dirname(kind))}, {width}×{height}"
 
 
 class Sums:
@@ -141,10 +134,10 @@ class Sums:
         return spp, self.render.fetch(mean)
 
 
-def parts(render, judged, limit):
+def parts(render, judged):
     """Milliseconds a pass for rendering, copying, pushing and judging, and the longest verdict."""
     seconds, longest, passes, begin = np.zeros(4), 0.0, 0, time.perf_counter()
-    while not judged.done and passes * PASS < limit and time.perf_counter() - begin < ENOUGH:
+    while not judged.done and passes * PASS < LIMIT and time.perf_counter() - begin < ENOUGH:
         passes += 1
         marks = [time.perf_counter()]
         image = render(PASS, passes)
@@ -197,38 +190,25 @@ def background(render, judged):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sizes", default="1920x1080,3840x2160")
-    parser.add_argument("--renderers", default="cuda,cornell")
-    parser.add_argument("--tile", type=int, default=64)
-    parser.add_argument("--limit", type=int, default=2048, help="samples per pixel at which every tile stops")
-    options = parser.parse_args()
-    query = ["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"]
-    try:
-        card = subprocess.run(query, check=True, text=True, stdout=subprocess.PIPE).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        card = "no NVIDIA card"
-    print(f"{card}; {os.cpu_count()} processors; noisefloor {noisefloor.__version__}")
-    kinds, sizes = options.renderers.split(","), [tuple(map(int, size.split("x"))) for size in options.sizes.split(",")]
-    renderers = {each: renderer(each[0], *each[1]) for each in itertools.product(kinds, sizes)}
+    renderers = {case: renderer(*case) for case in CASES}
 
     def passes():
-        for (kind, size), render in renderers.items():
+        for (kind, width, height), render in renderers.items():
             render(PASS, 10**6)  # compiles
-            judged = noisefloor.Session(*size, params=noisefloor.Params(tile=options.tile, max_spp=options.limit))
-            (rendered, *oracle), longest = parts(render, judged, options.limit)
+            judged = noisefloor.Session(width, height, params=noisefloor.Params(tile=TILE, max_spp=LIMIT))
+            (rendered, *oracle), longest = parts(render, judged)
             *cells, judging = (f"{number:.1f}" for number in [rendered, *oracle])
-            yield named(kind, *size), *cells, f"{judging} ({longest:.0f})", f"×{sum(oracle) / rendered:.2f}"
+            yield f"{kind}, {width}×{height}", *cells, f"{judging} ({longest:.0f})", f"×{sum(oracle) / rendered:.2f}"
 
     def walls():
-        for (kind, size), render in renderers.items():
-            params = noisefloor.Params(tile=options.tile, max_spp=options.limit, schedule="growing", step=16)
+        for (kind, width, height), render in renderers.items():
+            params = noisefloor.Params(tile=TILE, max_spp=CASES[kind, width, height], schedule="growing", step=16)
             alone(render, 2)  # warms up
-            waited, calls = waiting(render, noisefloor.Session(*size, params=params))
-            beside, more = background(render, noisefloor.Session(*size, params=params))
+            waited, calls = waiting(render, noisefloor.Session(width, height, params=params))
+            beside, more = background(render, noisefloor.Session(width, height, params=params))
             # Each beside as many samples without an oracle
             plain, as_many = alone(render, calls), alone(render, more)
-            yield (named(kind, *size), f"{plain:.2f} s", f"×{waited / plain:.2f}", f"×{beside / as_many:.2f}",
+            yield (f"{kind}, {width}×{height}", f"{plain:.2f} s", f"×{waited / plain:.2f}", f"×{beside / as_many:.2f}",
                    f"{100 * (more / calls - 1):.1f} %")
 
     table("gpu-pass", ["render", "copy", "push", "judge", "oracle : render"], passes())

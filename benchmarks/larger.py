@@ -10,7 +10,6 @@ A scene's folder has `1` and `2`, the seeds: halves at levels of samples, and wh
 only to four times what it, or one beside it, needs for a loss that is hardly noticed; beyond that, losses are taken to fall as they do
 on average. The reference has four times the samples of each tile, of a third seed, and is joined with the last level of the other seed.
 Needs numpy."""
-import argparse
 import csv
 import pathlib
 import subprocess
@@ -54,10 +53,6 @@ def load(path, channels=3):
     return np.fromfile(path, dtype="<f4").astype(np.float64).reshape(SIZE[1], SIZE[0], channels)
 
 
-def name(scene):
-    return pathlib.Path(scene).parent.name
-
-
 def counts(folder):
     """Samples and seconds of each tile, and what it would lose that lacks light, by level."""
     found = {}
@@ -80,11 +75,11 @@ def per_pixel(spp):
     return plane
 
 
-def render(args):
+def render(example, folder, most, *scenes):
     size = "x".join(map(str, SIZE))
-    for scene in args.scenes:
-        out = args.out / name(scene)
-        runs = [subprocess.Popen([args.example, "levels", out / seed, scene, size, seed, args.most]) for seed in SEEDS]
+    for scene in scenes:
+        out = pathlib.Path(folder, pathlib.Path(scene).parent.name)
+        runs = [subprocess.Popen([example, "levels", out / seed, scene, size, seed, most]) for seed in SEEDS]
         if any([run.wait() for run in runs]):
             print(f"{out.name}: failed", flush=True)
             continue
@@ -92,11 +87,11 @@ def render(args):
         spp = REFERENCE_TIMES * np.max([max(counts(out / seed).items())[1][:, 0] for seed in SEEDS], axis=0).astype(int)
         if not done.exists():
             np.savetxt(out / "reference-spp.txt", spp, "%d")
-            subprocess.run([args.example, "reference", out, scene, size, REFERENCE_SEED, *map(str, spp)], check=True)
+            subprocess.run([example, "reference", out, scene, size, REFERENCE_SEED, *map(str, spp)], check=True)
         join(out, spp)
         for seed in SEEDS:
             for command in ("estimate", "rivals"):
-                said = subprocess.run([args.example, command, out / seed], capture_output=True, check=True).stdout
+                said = subprocess.run([example, command, out / seed], capture_output=True, check=True).stdout
                 (out / seed / f"{command}.csv").write_bytes(said)
         print(f"{out.name}: done", flush=True)
 
@@ -111,10 +106,10 @@ def join(out, spp):
         (mean - noise).astype("<f4").tofile(out / seed / "reference-b.f32")
 
 
-def gather(args):
+def gather(out):
     rows = csv.writer(sys.stdout, lineterminator="\n")
     rows.writerow(["scene", "seed", "spp", "tile", *COLUMNS, *RULES])
-    for folder in sorted(f for out in sorted(args.out.iterdir()) for f in out.glob("[12]")):
+    for folder in sorted(pathlib.Path(out).glob("*/[12]")):
         if not (folder / "rivals.csv").exists():
             continue
         found = {}
@@ -331,9 +326,9 @@ def compared(pictures, outcomes, reference):
     return samples, seconds, lost, {by: (n, sign, n / samples, n * a_sample / seconds) for by, (n, sign) in same.items()}
 
 
-def tables(args):
+def tables(rows):
     """Against references of noisy pictures, which the pages have, and of denoised ones."""
-    scenes = read(args.rows)
+    scenes = read(rows)
     played = rules(scenes)
     uniform = [f"uniform, by {by}" for by in MEASURES]
     for reference, name in (("noisy", "larger"), ("denoised", "larger-denoised")):
@@ -366,7 +361,7 @@ def tables(args):
             print(f"- {label}: better than ours by " + "; ".join(f"{by} in {len(some)} ({', '.join(some)})" for by, some in ahead.items()))
 
 
-def plot(args):
+def plot(rows, out):
     """Loss against processor seconds: one count for all (lines), ours (rings), plain rules with their best constants (crosses)."""
     import matplotlib
     matplotlib.use("svg")
@@ -374,7 +369,7 @@ def plot(args):
     matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "noisefloor", "font.size": 9})
     from matplotlib import pyplot
 
-    scenes = read(args.rows)
+    scenes = read(rows)
     best = {rule: hindsight(scenes, rule) for rule in RULES}
     across = 5
     down = -(-len(scenes) // across)
@@ -399,21 +394,10 @@ def plot(args):
     figure.supxlabel("processor seconds")
     figure.supylabel("JOD lost")
     figure.tight_layout()
-    figure.savefig(args.out, metadata={"Date": None})
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = parser.add_subparsers(required=True)
-    words = {render: ["example", "out", "most", "scenes"], gather: ["out"], tables: ["rows"], plot: ["rows", "out"]}
-    for command, names in words.items():
-        sub = commands.add_parser(command.__name__)
-        sub.set_defaults(run=command)
-        for word in names:
-            sub.add_argument(word, nargs="+" if word == "scenes" else None, type=str if word in ("most", "scenes") else pathlib.Path)
-    args = parser.parse_args()
-    args.run(args)
+    figure.savefig(out, metadata={"Date": None})
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] not in (["render"], ["gather"], ["tables"], ["plot"]):
+        sys.exit(__doc__)
+    globals()[sys.argv[1]](*sys.argv[2:])

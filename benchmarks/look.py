@@ -64,35 +64,27 @@ def inside(box, edge):
     return slice(y + half, y + h - half), slice(x + half, x + w - half)
 
 
-def png(path):
-    return np.asarray(Image.open(path).convert("RGB"), dtype=np.float32) / 255
-
-
-def people(root):
-    """By scene: of each zone, as people stopped there, contrast in its worst window, JOD lost by its worst 64x64, and by all of it."""
-    for folder in ("lisic9", "lisic-two"):
-        rows = list(csv.DictReader(open(root / folder / "thresholds.csv")))
-        for scene in sorted({r["scene"] for r in rows}):
-            files = sorted((root / folder / scene).glob("*.png"), key=lambda p: int(p.stem))
-            last, many = png(files[-1]), int(files[-1].stem)
-            early = [p for p in files if int(p.stem) <= many / 3][-1]
-            of_one = (png(early) - last) / math.sqrt(1 / int(early.stem) - 1 / many)
-            zones = [r for r in rows if r["scene"] == scene]
-            # The last picture contains the samples of the earlier ones
-            noise = [1 / max(1 / min(float(r["human_spp"]), 0.999 * many) - 1 / many, 1e-9) for r in zones]
-            typical = math.exp(np.mean(np.log(noise)))
-            noisy = np.clip(last + of_one / math.sqrt(typical), 0, 1)
-            narrow, wide = contrast(noisy, last, 28), contrast(noisy, last, 64)
-            found = []
-            for r, m in zip(zones, noise):
-                x, y, w, h = box = [int(r[k]) for k in ("x", "y", "width", "height")]
-                field = wide[inside(box, 64)]
-                v, u = np.unravel_index(field.argmax(), field.shape)
-                test = last + of_one / math.sqrt(m)
-                part, zone = np.s_[y + v : y + v + 64, x + u : x + u + 64], np.s_[y : y + h, x : x + w]
-                c = narrow[inside(box, 28)].max() * math.sqrt(typical / m)
-                found.append((c, lost(test[part], last[part]), lost(test[zone], last[zone])))
-            yield scene, *zip(*found)
+def people(judged):
+    """By scene, of figures.judged(): of each zone, as people stopped there, contrast in its worst window, JOD lost by its worst
+    64x64, and by all of it."""
+    for scene, last, many, early, n, zones in judged:
+        last = last.astype(np.float32)
+        of_one = (early.astype(np.float32) - last) / math.sqrt(1 / n - 1 / many)
+        # The last picture contains the samples of the earlier ones
+        noise = [1 / max(1 / min(float(r["human_spp"]), 0.999 * many) - 1 / many, 1e-9) for r in zones]
+        typical = math.exp(np.mean(np.log(noise)))
+        noisy = np.clip(last + of_one / math.sqrt(typical), 0, 1)
+        narrow, wide = contrast(noisy, last, 28), contrast(noisy, last, 64)
+        found = []
+        for r, m in zip(zones, noise):
+            x, y, w, h = box = [int(r[k]) for k in ("x", "y", "width", "height")]
+            field = wide[inside(box, 64)]
+            v, u = np.unravel_index(field.argmax(), field.shape)
+            test = last + of_one / math.sqrt(m)
+            part, zone = np.s_[y + v : y + v + 64, x + u : x + u + 64], np.s_[y : y + h, x : x + w]
+            c = narrow[inside(box, 28)].max() * math.sqrt(typical / m)
+            found.append((c, lost(test[part], last[part]), lost(test[zone], last[zone])))
+        yield scene, *zip(*found)
 
 
 def picture(out, scaled):
