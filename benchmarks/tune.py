@@ -26,8 +26,7 @@ import zipfile
 
 from figures import table
 
-THRESHOLDS = [("threshold", t) for t in (0.2, 0.1, 0.05, 0.03, 0.01)]
-SAMPLES = [("samples", n) for n in (64, 256)]
+THRESHOLDS, DEFAULT, SAMPLES = (0.2, 0.1, 0.05, 0.03), 0.01, (64, 256)
 
 
 def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
@@ -70,10 +69,7 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
         cycles.use_adaptive_sampling, cycles.samples = False, 8
         bpy.ops.render.render()
 
-    def used():
-        if device != "CPU":
-            return time.time()
-        return resource.getrusage(resource.RUSAGE_SELF).ru_utime
+    used = time.time if device != "CPU" else lambda: resource.getrusage(resource.RUSAGE_SELF).ru_utime
 
     def one(kind, value, seed):
         name = f"{kind}-{value:g}-{seed}"
@@ -90,10 +86,6 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
         bpy.data.images["Render Result"].save_render(str(folder / f"{name}.png"), scene=scene)
         times.write_text(json.dumps(done, indent=1))
         print(name, done[name], flush=True)
-
-    def some(chosen, seed):
-        for kind, value in chosen:
-            one(kind, value, seed)
 
     if "search" not in done:
         cycles.use_adaptive_sampling, cycles.seed, cycles.adaptive_threshold, cycles.samples = True, 3, 0.01, 4096
@@ -113,13 +105,13 @@ def render(addon, path, size, folder, reference=4096, seeds=2, device="CPU"):
         one("loop", 0, seed)
         if done["search"]["found"]:
             one("tuned", done["search"]["found"], seed)
-        if not small:
-            some(THRESHOLDS[:-1], seed)
+        for threshold in () if small else THRESHOLDS:
+            one("threshold", threshold, seed)
     one("samples", reference, 77)
     for seed in range(1, seeds + 1):
-        some(THRESHOLDS[-1:], seed)
-    if not small:
-        some(SAMPLES, 1)
+        one("threshold", DEFAULT, seed)
+    for samples in () if small else SAMPLES:
+        one("samples", samples, 1)
 
 
 def label(name):

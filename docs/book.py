@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks the documentation's links, and builds it as one searchable book.
 
-    docs/book.py [--mdbook mdbook]    checks, then builds target/book/html/index.html with mdBook
+    docs/book.py                      checks, then builds target/book/html/index.html with mdBook
     docs/book.py --check              checks the pages alone
 
 Pages stay where a forge shows them: beside the code that they describe. So they are copied into target/book/src,
@@ -153,14 +153,13 @@ def check_book(folder):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--check", action="store_true", help="check the pages, and build nothing")
-    parser.add_argument("--mdbook", default="mdbook", help="the program that builds the book")
     args = parser.parse_args()
     pages = [file for file in tracked() if file.endswith(".md")]
     faults, linked = check_pages(pages)
     faults += check_places("docs/paper.md")
     if not args.check:
         stage(pages, linked)
-        subprocess.run([args.mdbook, "build", BOOK], check=True)
+        subprocess.run(["mdbook", "build", BOOK], check=True)
         faults += check_book(BOOK / "html")
     print("\n".join(faults) or f"{len(pages)} pages, and every link leads somewhere")
     sys.exit(1 if faults else 0)
