@@ -31,17 +31,11 @@ OWN = [
     "scrambling_distance",
     "adaptive_min_samples",
     "samples",
-    "use_auto_tile",
-    "use_sample_subset",
-    "sample_offset",
 ]
 
 
 class Cycles:
     def __init__(self, init):
-        if init.get("options"):
-            raise ValueError(f"there is nothing to choose: {init['options']}")
-
         import bpy
         import numpy
 
@@ -155,19 +149,13 @@ class Cycles:
         """The picture, or a part of it, as Cycles renders it by the settings of the scene, until this noise threshold; not denoised. Its pixel
         filter is sampled, so that the noise of neighbours stays independent. With the samples of its pixels, and their limits."""
         cycles, render = self.scene.cycles, self.scene.render
-        names = [*self.own, "use_adaptive_sampling", "adaptive_threshold", "seed"]
-        before = {name: getattr(cycles, name) for name in names}
+        before = {name: getattr(cycles, name) for name in [*self.own, "use_adaptive_sampling"]}
         layer = next(layer for layer in self.scene.view_layers if layer.use)
         counted = layer.cycles.pass_debug_sample_count
         try:
             for name, value in self.own.items():
                 setattr(cycles, name, value)
-            if hasattr(cycles, "use_sample_subset"):
-                cycles.use_sample_subset = False
-            cycles.sample_offset = 0
-            cycles.use_adaptive_sampling, cycles.adaptive_threshold, cycles.seed = True, threshold, seed
-            if samples:
-                cycles.samples = samples
+            adapt(cycles, seed, threshold, samples or cycles.samples)
             # Of this picture, and of one that is as good as two where samples follow the threshold
             fewest = [least(cycles.adaptive_min_samples, each, cycles.samples) for each in (threshold, threshold / math.sqrt(2))]
             limits = cycles.adaptive_min_samples, threshold, cycles.samples

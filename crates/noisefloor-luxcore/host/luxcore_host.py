@@ -2,8 +2,8 @@
 
 Scenes are LuxCore's own: a configuration (.cfg) that names a scene, or a scene (.scn) by itself. Options:
 
-- engine: "path" (default) or "bidir", which LuxCore calls PATHCPU and BIDIRCPU;
-- sampler: "random" (default), "sobol" or "metropolis".
+- engine: "path" or "bidir", which LuxCore calls PATHCPU and BIDIRCPU;
+- sampler: "random", "sobol" or "metropolis".
 
 How batches stay independent differs. A session of the random and the Sobol sampler costs little but for the tree over the
 scene's triangles, so every call starts new ones, with seeds never used before: no stream of random numbers goes on, none
@@ -72,14 +72,7 @@ def _root(folder, scene_file):
 
 class LuxCore:
     def __init__(self, init):
-        options = dict(init.get("options") or {})
-        engine, sampler = options.pop("engine", "path"), options.pop("sampler", "random")
-        if engine not in ENGINES or sampler not in SAMPLERS or options:
-            raise ValueError(
-                f"engine {engine!r}, sampler {sampler!r}{f', {options}' if options else ''}: engines are "
-                f"{', '.join(ENGINES)}, samplers are {', '.join(SAMPLERS)}, and there is nothing else to choose"
-            )
-
+        engine, sampler = (init["options"][name] for name in ("engine", "sampler"))
         # numpy first: pyluxcore crashes if it is the one that loads it
         import numpy
         import pyluxcore

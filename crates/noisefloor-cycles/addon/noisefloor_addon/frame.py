@@ -40,16 +40,14 @@ def film_rate(scene):
     return rate if scene.cycles.use_animated_seed and rate >= 10 else None
 
 
+def clock(seconds):
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
+
+
 def cells(region):
     """The cells that a region has pixels of."""
     x, y, width, height = region
     return slice(y // CELL, -(-(y + height) // CELL)), slice(x // CELL, -(-(x + width) // CELL))
-
-
-def _of_cells(of, values):
-    """What a function of numpy makes of the values in each cell."""
-    down, across = (numpy.arange(0, side, CELL) for side in values.shape)
-    return of.reduceat(of.reduceat(values, down, 0), across, 1)
 
 
 class Frame:
@@ -175,11 +173,10 @@ class Frame:
         as good as after one picture with the threshold `each`; others get as much less as they are better."""
         jobs = []
         target, first = 1 / each**2, 0.5 / COARSEST**2
-        most = _of_cells(numpy.maximum, numpy.maximum(*(half.samples[..., 0] for half in self.halves)))
         for cell in zip(*numpy.nonzero(self.ratio > 1)):
             y, x = (int(place) * CELL for place in cell)
             width, height = min(CELL, self.size[0] - x), min(CELL, self.size[1] - y)
-            samples = self.settings.max_samples // 2 - int(most[cell])
+            samples = self._room((x, y, width, height))
             wanted = target
             if self.excess is not None and self.excess.ratio < math.inf:
                 share = math.log(self.ratio[cell] / AIM) / math.log(self.excess.ratio / AIM)
@@ -250,7 +247,9 @@ class Frame:
         self.search.tell(self.excess.ratio, alone=self.excess.ratio)
         if self.on_gpu:
             known = sum(half.samples for half in self.halves)[..., 0] / 2
-            self.rate = _of_cells(numpy.add, known) / CELL**2 / numpy.maximum(self.effort, 1)
+            rows, columns = (numpy.arange(0, side, CELL) for side in known.shape)
+            summed = numpy.add.reduceat(numpy.add.reduceat(known, rows, 0), columns, 1)
+            self.rate = summed / CELL**2 / numpy.maximum(self.effort, 1)
         # What fails by so much needs the square of that as many samples, as far as it is noise
         spp = sum(half.samples for half in self.halves)[..., 0]
         times = numpy.kron(numpy.clip(self.ratio, 1, 1e3) ** 2, numpy.ones((CELL, CELL)))

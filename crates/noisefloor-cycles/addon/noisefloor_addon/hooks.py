@@ -21,7 +21,7 @@ from bpy.app.handlers import persistent
 from gpu_extras.presets import draw_texture_2d
 
 from . import compositor, display, maps, passes
-from .frame import Frame, warn
+from .frame import Frame, clock, warn
 
 original = {}
 # By which Blender, too, knows that a file has been named in full, beside its own
@@ -193,7 +193,7 @@ def _progress(frame):
     if frame.excess:
         text += f", {frame.excess.ratio:.2f} times what may be seen in the worst place"
     if left is not None:
-        text += f", about {int(left) // 60}:{int(left) % 60:02} left"
+        text += f", about {clock(left)} left"
     return text, share
 
 

@@ -27,7 +27,7 @@ class Judge:
         self.denoiser = denoise.Denoiser(self.library, device, **how) if self.library else None
         self.guides = {"RGB": [], "RGB_ALBEDO": [ALBEDO]}.get(cycles.denoising_input_passes, [ALBEDO, NORMAL])
         self.transparent = scene.render.film_transparent
-        self.oracle = settings.oracle(self.settings)
+        self.oracle = noisefloor.Oracle(self.settings.people)
         self.params = settings.params(scene, shown, film)
         self.view = scene.view_settings.view_transform
 

@@ -66,12 +66,9 @@ class Settings(bpy.types.PropertyGroup):
     )
 
 
-def oracle(settings):
-    return noisefloor.Oracle(settings.people)
-
-
-def people(scene, film=None):
-    """Who looks, and where; film: frames per second, or None for a still."""
+def params(scene, shown, film=None):
+    """How pictures are judged: who looks, and where; shown: as display.table() says; film: frames per second, or None for a
+    still."""
     settings, found = scene.noisefloor, {"viewing": scene.noisefloor.viewing}
     if settings.viewing == "mine":
         eyes = noisefloor.eyes()
@@ -82,9 +79,4 @@ def people(scene, film=None):
         found = {"viewing": eyes.viewing, "audience": eyes.audience}
     if film:
         found["viewing"] = f"{found['viewing']},fps={film:.6g}"
-    return found
-
-
-def params(scene, shown, film=None):
-    """How pictures are judged; shown: as display.table() says; film: frames per second, or None for a still."""
-    return noisefloor.Params(tile=64, tone_mapping=shown, **people(scene, film))
+    return noisefloor.Params(tile=64, tone_mapping=shown, **found)

@@ -212,7 +212,7 @@ class Search:
         if steps:
             text += f"; {steps[-1][0]:.3g} leaves {steps[-1][1]:.2f} times what may be seen"
         if left is not None:
-            text += f"; about {clock(left)} left"
+            text += f"; about {frame.clock(left)} left"
         return text
 
     def finish(self):
@@ -259,10 +259,6 @@ class Search:
         self.scene.frame_set(self.scene.frame_current)
         animated, cycles.adaptive_threshold = cycles.adaptive_threshold != written, written
         return animated
-
-
-def clock(seconds):
-    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
 
 
 class RENDER_OT_noisefloor_threshold(bpy.types.Operator):
@@ -364,7 +360,7 @@ class RENDER_OT_noisefloor_stop(bpy.types.Operator):
 def estimate(scene):
     """What a search will take, in words."""
     last = hooks.state.took.get(scene.name)
-    about = f", about {clock(last)} to {clock(5 * last)}" if last else ""
+    about = f", about {frame.clock(last)} to {frame.clock(5 * last)}" if last else ""
     return f"Takes one to five frames{about}"
 
 
