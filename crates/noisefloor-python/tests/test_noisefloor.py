@@ -103,6 +103,13 @@ def noisy(seed, spp, shape=(64, 96, 3)):
     return (ramp + np.random.default_rng(seed).normal(0, 1 / np.sqrt(spp), shape)).astype(np.float32)
 
 
+def smooth(radiance):
+    """A mean over 9x9 pixels: a denoiser, of module level so that it can be pickled."""
+    padded = np.pad(radiance, ((4, 4), (4, 4), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (9, 9), axis=(0, 1))
+    return windows.mean(axis=(-2, -1)).astype(np.float32)
+
+
 EYES = """version = 1
 [[person]]
 name = "anna"
@@ -623,13 +630,6 @@ class Faults(Test):
         ])
 
 
-def smooth(radiance):
-    """A mean over 9x9 pixels: a denoiser, of module level so that it can be pickled."""
-    padded = np.pad(radiance, ((4, 4), (4, 4), (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (9, 9), axis=(0, 1))
-    return windows.mean(axis=(-2, -1)).astype(np.float32)
-
-
 class Denoised(Test):
     """Tiles stop by what a function of Python makes of the samples."""
 
@@ -844,12 +844,9 @@ class Pictures(Test):
         self.assertEqual((noise.shape, noise.dtype), ((64, 96), np.float32))
 
     def test_pictures_that_do_not_belong_together_are_warned_of(self):
-        """Blurred by 3x3 pixels; and the other with three times the exposure. Each warning is kept by pickle."""
-        def blur(image):
-            around = [np.roll(image, (dy, dx), (0, 1)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
-            return np.float32(np.mean(around, axis=0))
+        """Blurred; and the other with three times the exposure. Each warning is kept by pickle."""
         one, other = noisy(1, 20), noisy(2, 20)
-        for word, pair in (("denoised, blurred", (blur(one), blur(other))), ("exposure", (one, 3 * other))):
+        for word, pair in (("denoised, blurred", (smooth(one), smooth(other))), ("exposure", (one, 3 * other))):
             with self.subTest(word):
                 judged = nf.judge(pair[0], 20, pair[1], 20, samples="independent")
                 self.assertEqual([word in text for text in judged.warnings], [True])
@@ -1025,30 +1022,21 @@ class Documentation(Test):
 
 @unittest.skipUnless(hasattr(os, "fork"), "there is no fork")
 class Forks(Test):
-    def test_children_judge_as_their_parents_do(self):
+    def test_children_judge_as_their_parents_do_also_beside_threads_that_judge(self):
         pair = noisy(1, 64), 64, noisy(2, 64), 64
-
-        def judge():
-            judged = nf.judge(*pair, samples="independent", params=PARAMS)
-            return [verdict.probability for verdict in judged.verdicts]
-
+        judge = lambda: nf.judge(*pair, samples="independent", params=PARAMS).verdicts
         stops, right = finish(nf.Session(96, 80, params=PARAMS)), judge()
 
         def work():
-            assert judge() == right
-            assert finish(nf.Session(96, 80, params=PARAMS)) == stops
+            self.assertEqual(judge(), right)
+            self.assertEqual(finish(nf.Session(96, 80, params=PARAMS)), stops)
             # And a child of the child
-            assert in_child(lambda: self.assertEqual(judge(), right)) == 0
+            self.assertEqual(in_child(lambda: self.assertEqual(judge(), right)), 0)
 
-        for _ in range(5):
-            self.assertEqual(in_child(work), 0)
+        for threads in (0, 3):
+            with beside(judge, threads):
+                self.assertEqual([in_child(work) for _ in range(5)], [0] * 5)
         self.assertEqual(judge(), right)
-
-    def test_a_fork_beside_threads_that_judge(self):
-        pair = noisy(1, 64), 64, noisy(2, 64), 64
-        judge = lambda: nf.judge(*pair, samples="independent", params=PARAMS)
-        with beside(judge, threads=3):
-            self.assertEqual([in_child(judge) for _ in range(5)], [0] * 5)
 
 
 class Settings(Test):
@@ -1111,11 +1099,8 @@ class Settings(Test):
         self.assertTrue({look.view for look in looks if not look.crop} == {0, 1} and search.steps[-1][1] <= 1)
 
     def test_denoised_pictures_are_judged_by_what_they_have_lost(self):
-        def blur(picture, by):
-            return sum(np.roll(picture, (dy, dx), (0, 1)) for dy in by for dx in by) / np.float32(len(by) ** 2)
-
         pair, params = (self.noisy(1, 0.2), self.noisy(2, 0.2)), nf.Params(tone_mapping="srgb")
-        denoised = tuple(blur(picture, range(-1, 2)) for picture in pair)
+        denoised = tuple(map(smooth, pair))
         half = nf.excess(*pair, params=params, denoised=denoised, lost=0.6)
         for found in (half, nf.excess(*pair, params=params)):
             squares = found.squares()
