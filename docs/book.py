@@ -11,7 +11,7 @@ that mdBook made. Links to other sites are not followed. The places in the code 
 """
 
 import argparse
-import html.parser
+import html
 import os
 import pathlib
 import re
@@ -29,6 +29,7 @@ LINK = re.compile(r"\]\(<?([^()\s<>]+)>?(?:\s+\"[^\"]*\")?\)|(?:src|href)=\"([^\
 HEADING = re.compile(r"^#+ +(.*?) *#*$", re.MULTILINE)
 PLACE = re.compile(r"`((?!crates/|fixtures/|examples/)([a-z]+)/([\w/.]*))`((?: `[A-Za-z_:]+`,?)*)")
 INDEX = re.compile(r"README\.md(?=$|[)#])")
+HREF = re.compile(r"\b(?:href|src)=\"([^\"]+)\"")
 ID = re.compile(r"(?:id|name)=\"([^\"]+)\"")
 
 
@@ -115,37 +116,21 @@ def stage(pages, linked):
     (BOOK / "src/SUMMARY.md").write_text(INDEX.sub("index.md", summary))
 
 
-class Page(html.parser.HTMLParser):
-    """Links and anchors of a page of the book."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.links, self.ids = [], set()
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        for name, value in attributes:
-            if name in ("href", "src") and value:
-                self.links.append(value)
-            elif name in ("id", "name") and value:
-                self.ids.add(value)
-
-
 def check_book(folder):
     """What is wrong with links in the book."""
-    pages = {path: Page(path.read_text()) for path in sorted(folder.rglob("*.html"))}
-    faults = []
-    for path, page in pages.items():
+    pages = {path: path.read_text() for path in sorted(folder.rglob("*.html"))}
+    ids, faults = {path: set(ID.findall(text)) for path, text in pages.items()}, []
+    for path, text in pages.items():
         if path.name in ("404.html", "print.html", "toc.html"): # these repeat the others, with a base of their own
             continue
-        for link in page.links:
-            url = urllib.parse.urlsplit(link)
+        for link in HREF.findall(text):
+            url = urllib.parse.urlsplit(html.unescape(link))
             if url.scheme or url.netloc:
                 continue
             file = (path.parent / urllib.parse.unquote(url.path)).resolve() if url.path else path
             if not file.exists():
                 faults.append(f"{path.relative_to(folder)}: {link}: there is no such file in the book")
-            elif url.fragment and file in pages and url.fragment not in pages[file].ids:
+            elif url.fragment and url.fragment not in ids.get(file, [url.fragment]):
                 faults.append(f"{path.relative_to(folder)}: {link}: there is no such anchor in the book")
     return faults
 
