@@ -198,13 +198,7 @@ def apart(scene, name):
 def glass(scene):
     transparent(scene)
     scene.cycles.film_transparent_glass = True
-    made = bpy.data.materials.new("glass")
-    made.use_nodes = True
-    own = made.node_tree.nodes["Principled BSDF"].inputs
-    own["Transmission Weight"].default_value, own["Roughness"].default_value = 1.0, 0.0
-    cube = bpy.data.objects["Cube"]
-    cube.data.materials.clear()
-    cube.data.materials.append(made)
+    bpy.data.objects["Cube"].data.materials[0] = scenes.material(Transmission_Weight=1.0, Roughness=0.0)
 
 
 def groups(scene):
@@ -214,14 +208,10 @@ def groups(scene):
     assert [group.name for group in layer.lightgroups] == ["key"]
 
 
-class Excess:
+def excess_of(squares):
     """What a judge has found, of squares with x, y, width, height and ratio."""
-
-    def __init__(self, squares):
-        self.squares, self.ratio = lambda: squares, max(ratio for *_, ratio in squares)
-
-    def map(self):
-        return numpy.zeros(SIZE[::-1], numpy.float32)
+    ratio, left = max(ratio for *_, ratio in squares), numpy.zeros(SIZE[::-1], numpy.float32)
+    return types.SimpleNamespace(squares=lambda: squares, ratio=ratio, map=lambda: left)
 
 
 def everything(scene):
@@ -494,7 +484,7 @@ class Addon(unittest.TestCase):
             """Two squares of a row, one four times as far from passing as the other, and one below that passes."""
             efforts.append(hooks.state.frame.effort.copy())
             ratio = lambda x, threshold: (threshold**-2 / efforts[-1][0, x // 32]) ** 0.5
-            return Excess([(0, 32, 64, 64, 0.5), *((x, 0, 32, 32, ratio(x, t)) for x, t in [(0, 0.06), (96, 0.12)])])
+            return excess_of([(0, 32, 64, 64, 0.5), *((x, 0, 32, 32, ratio(x, t)) for x, t in [(0, 0.06), (96, 0.12)])])
 
         with patch.object(judging.Judge, "excess", excess):
             _, parts = rendered(scene)
@@ -519,7 +509,7 @@ class Addon(unittest.TestCase):
         def excess(self, pair):
             efforts.append(hooks.state.frame.effort.copy())
             ratio = lambda place: (wanted[place] ** -2 / efforts[-1][place]) ** 0.5
-            return Excess([(32 * x, 32 * y, 32, 32, ratio((y, x))) for y, x in wanted])
+            return excess_of([(32 * x, 32 * y, 32, 32, ratio((y, x))) for y, x in wanted])
 
         for device in (None, "CUDA"):
             with patch.object(judging.Judge, "excess", excess), patch.object(denoise, "gpu", lambda scene: device):
@@ -966,8 +956,8 @@ class Addon(unittest.TestCase):
             self.assertEqual(kind, denoise.CPU)
             self.assertIn("the processor denoises: Open Image Denoise", note)
             scene.render.resolution_x, scene.render.resolution_y = 640, 480
-            self.assertEqual(len(looks(tune.Search(scene))), 1, "the whole again and again")
-        self.assertGreater(len(looks(tune.Search(scene))), 1)
+            self.assertIsNone(searched(scene))
+        self.assertEqual(searched(scene), (640, 480))
         # What a GPU gets by way of its own memory, and keeps for the next picture, is what the processor reads where it lies:
         # from the bottom, beside an alpha that is left alone
         random = numpy.random.default_rng(4)
@@ -985,17 +975,11 @@ class Addon(unittest.TestCase):
             own.denoise(one, None, normal)
 
 
-def looks(search):
-    """The sizes of what a search looks at until the third picture is to be rendered, of fakes."""
-    search.end()
-    sizes = []
-    for look in itertools.islice(search.search, 8):
-        sizes.append(look.crop)
-        random = numpy.random.default_rng(len(sizes))
-        pair = [numpy.float32(random.normal(0.5, 0.3, (*search.size[::-1], 3))) for _ in range(2)]
-        excess = noisefloor.excess(*pair, params=search.judge.params)
-        search.search.tell(excess)
-    return set(sizes)
+def searched(scene):
+    """The size of the pictures in which a search may look at parts; None if it may not."""
+    with patch.object(noisefloor, "Search") as search:
+        tune.Search(scene).end()
+    return search.call_args.kwargs["size"]
 
 
 def drawn(scene):
