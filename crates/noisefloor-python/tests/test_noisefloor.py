@@ -359,23 +359,20 @@ class Backgrounds(Test):
     def test_it_ends_while_another_thread_hands_over(self):
         session = nf.Session(96, 80, params=nf.Params(tile=32, max_spp=10**9), linear=True)
         background = nf.Background(session, waiting=1)
-        raised, begun = [], threading.Event()
+        begun = threading.Event()
 
         def render():
-            try:
-                for image in self.passes(10**6, spp=1):
-                    background.push_image(1, image)
-                    background.judge()
-                    begun.set()
-            except nf.Error as error:
-                raised.append(str(error))
+            for image in self.passes(10**6, spp=1):
+                background.push_image(1, image)
+                background.judge()
+                begun.set()
 
-        renderer = threading.Thread(target=render)
-        renderer.start()
-        self.assertTrue(begun.wait(60))
-        self.assertIs(background.end(), session)
-        renderer.join()
-        self.assertIn("given back", raised[0])
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            renderer = pool.submit(render)
+            self.assertTrue(begun.wait(60))
+            self.assertIs(background.end(), session)
+        with self.assertRaisesRegex(nf.Error, "given back"):
+            renderer.result()
         self.assertTrue((session.spp() > 0).all())
 
     def test_it_ends_with_its_block(self):
@@ -409,24 +406,23 @@ class Backgrounds(Test):
         def broken(radiance):
             raise ZeroDivisionError("no light")
 
-        params = nf.Params(tile=32, schedule="growing", step=48, min_spp=48)
-        for denoiser in (smooth, broken):
-            session = nf.Session(96, 80, params=params, denoiser=denoiser, linear=True)
-            background = nf.Background(session)
+        def fill(background):
             for image in self.passes(8):
-                try:
-                    background.push_image(16, image)
-                    background.judge()
-                except ZeroDivisionError:
-                    self.assertIs(denoiser, broken)
-                    break
-            if denoiser is smooth:
-                background.finish()
-                self.assertIsNotNone(background.end().jods_lost())
-            else:
-                with self.assertRaises(nf.Error):
-                    background.finish()
-                del background  # while its thread may wait for the interpreter
+                background.push_image(16, image)
+                background.judge()
+
+        params = nf.Params(tile=32, schedule="growing", step=48, min_spp=48)
+        whole, failing = (
+            nf.Background(nf.Session(96, 80, params=params, denoiser=denoiser, linear=True)) for denoiser in (smooth, broken)
+        )
+        fill(whole)
+        whole.finish()
+        self.assertIsNotNone(whole.end().jods_lost())
+        with self.assertRaises(ZeroDivisionError):
+            fill(failing)
+        with self.assertRaises(nf.Error):
+            failing.finish()
+        del failing  # while its thread may wait for the interpreter
 
     def test_a_script_ends_beside_a_denoiser_as_without(self):
         """The thread is within the denoiser then, and comes back when there is no interpreter any more, or hardly."""
