@@ -460,6 +460,16 @@ class Backgrounds(Test):
         background.end()
 
 
+class Lying:
+    """An array on a device, by DLPack's number of its kind."""
+
+    def __init__(self, device):
+        self.device = device
+
+    def __dlpack_device__(self):
+        return (self.device, 0)
+
+
 class OnDevices(Test):
     """Arrays as frameworks for GPUs have them. What they hold lies here, as no device is needed to say so."""
 
@@ -471,13 +481,7 @@ class OnDevices(Test):
         return session.image()
 
     def test_arrays_in_memory_are_read_where_they_lie(self):
-        class Readable:
-            def __init__(self, device):
-                self.device = device
-
-            def __dlpack_device__(self):
-                return (self.device, 0)
-
+        class Readable(Lying):
             def __dlpack__(self, **options):
                 return OnDevices.IMAGE.__dlpack__()
 
@@ -488,14 +492,11 @@ class OnDevices(Test):
                 np.testing.assert_array_equal(self.pushed(Readable(device)), self.IMAGE)
 
     def test_arrays_on_a_device_are_copied_as_their_framework_does(self):
-        class Device:
+        class Device(Lying):
             """Refuses what numpy tries, as CuPy and PyTorch do."""
 
             def __array__(self, *arguments, **options):
                 raise TypeError("implicit conversion to a NumPy array is not allowed")
-
-            def __dlpack_device__(self):
-                return (2, 0)
 
         class CuPy(Device):
             __cuda_array_interface__ = {"shape": (32, 48, 3), "typestr": "<f4", "data": (64, True), "version": 3}
@@ -513,25 +514,19 @@ class OnDevices(Test):
             def __array__(self, *arguments, **options):
                 return OnDevices.IMAGE
 
-        for kind in (CuPy, Torch, DrJit):
-            with self.subTest(kind=kind.__name__):
-                np.testing.assert_array_equal(self.pushed(kind()), self.IMAGE)
+        for array in (CuPy(2), Torch(2), DrJit()):
+            with self.subTest(kind=type(array).__name__):
+                np.testing.assert_array_equal(self.pushed(array), self.IMAGE)
 
         class Broken(CuPy):
             def get(self):
                 raise RuntimeError("out of memory")
 
         with self.assertRaisesRegex(nf.SizeError, "out of memory"):
-            self.pushed(Broken())
+            self.pushed(Broken(2))
 
-        class Interrupted:
+        class Interrupted(Lying):
             """Ctrl-C, while the framework works: as it lies here, and on a device."""
-
-            def __init__(self, device):
-                self.device = device
-
-            def __dlpack_device__(self):
-                return (self.device, 0)
 
             def __dlpack__(self, **options):
                 raise KeyboardInterrupt
