@@ -28,15 +28,20 @@ struct Limits {
     connections: usize,
     /// Most of one address, which must not lock out the others. Further ones are closed.
     of_address: usize,
+    /// Time for the headers of a request to arrive in full, and the longest pause between two requests of a
+    /// connection.
+    header_time: Duration,
     /// Time for a peer to take a share of a reply.
     write_time: Duration,
 }
 
 /// Below the usual limit of 1024 files; a laboratory of seventy behind one address has six for each browser.
-const LIMITS: Limits = Limits { connections: 900, of_address: 450, write_time: Duration::from_secs(30) };
-/// Time for the headers of a request to arrive in full, and the longest pause between two requests of a
-/// connection.
-const HEADER_TIME: Duration = Duration::from_secs(10);
+const LIMITS: Limits = Limits {
+    connections: 900,
+    of_address: 450,
+    header_time: Duration::from_secs(10),
+    write_time: Duration::from_secs(30),
+};
 /// Time for requests under way to finish once the server is asked to stop.
 const DRAIN_TIME: Duration = Duration::from_secs(3);
 /// Pause after the operating system refused a connection, for example because too many files are open.
@@ -81,7 +86,7 @@ impl Listening {
             .method_not_allowed_fallback(wrong_method)
             .layer(from_fn_with_state(self.guard(), check))
             .layer(from_fn(security_headers));
-        let Limits { connections, of_address, write_time } = self.limits;
+        let Limits { connections, of_address, .. } = self.limits;
         let (slots, places) = (Arc::new(Semaphore::new(connections)), Places::default());
         let graceful = GracefulShutdown::new();
         let mut stop = pin!(stop);
@@ -99,7 +104,7 @@ impl Listening {
                     // Proxies stand for many
                     let most = if self.guard.trusts(peer.ip()) { connections } else { of_address };
                     let Some(place) = places.take(peer.ip(), most) else { continue };
-                    let connection = connection(stream, peer, write_time, &router, &graceful);
+                    let connection = connection(stream, peer, self.limits, &router, &graceful);
                     tokio::spawn(async move {
                         connection.await;
                         drop((slot, place));
@@ -157,7 +162,7 @@ impl Drop for Place {
 fn connection(
     stream: tokio::net::TcpStream,
     peer: SocketAddr,
-    write_time: Duration,
+    limits: Limits,
     router: &Router,
     graceful: &GracefulShutdown,
 ) -> impl Future<Output = ()> + use<> {
@@ -166,8 +171,8 @@ fn connection(
     let service = TowerToHyperService::new(router.clone().layer(Extension(ConnectInfo(peer))));
     let served = http1::Builder::new()
         .timer(TokioTimer::new())
-        .header_read_timeout(HEADER_TIME)
-        .serve_connection(Patient::new(TokioIo::new(stream), write_time), service);
+        .header_read_timeout(limits.header_time)
+        .serve_connection(Patient::new(TokioIo::new(stream), limits.write_time), service);
     let watched = graceful.watch(served);
     async move {
         // A peer that hangs up or is too slow is not an error of the server
@@ -262,7 +267,7 @@ mod tests {
     #[test]
     fn who_never_reads_is_dropped() {
         let write_time = Duration::from_millis(500);
-        let served = Served::within(Limits { connections: 2, of_address: 2, write_time });
+        let served = Served::within(Limits { connections: 2, of_address: 2, write_time, ..LIMITS });
         let [mut stuck, other] = [0; 2].map(|_| served.ask(LOCAL, "/large"));
         sleep(Duration::from_millis(100));
         assert!(is_answered(served.ask(LOCAL, "/")));
@@ -275,11 +280,20 @@ mod tests {
         drop(other);
     }
 
+    #[test]
+    fn half_a_header_is_closed_in_time() {
+        let served = Served::within(Limits { header_time: Duration::from_millis(200), ..LIMITS });
+        let mut slow = TcpStream::connect(served.address).unwrap();
+        slow.write_all(b"GET / HTTP/1.1\r\nhost: ").unwrap();
+        slow.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+        slow.read_to_end(&mut Vec::new()).unwrap();
+    }
+
     /// Who reads slowly, and pauses between requests for longer than the time allowed, gets everything.
     #[test]
     fn who_reads_slowly_is_served() {
         let write_time = Duration::from_millis(300);
-        let served = Served::within(Limits { connections: 2, of_address: 2, write_time });
+        let served = Served::within(Limits { connections: 2, of_address: 2, write_time, ..LIMITS });
         let mut slow = served.ask(LOCAL, "/large");
         let (mut got, mut part) = (0, vec![0; 1 << 20]);
         while got < LARGE {
@@ -303,7 +317,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     fn one_address_leaves_room_for_others() {
         let write_time = Duration::from_secs(60);
-        let served = Served::within(Limits { connections: 4, of_address: 2, write_time });
+        let served = Served::within(Limits { connections: 4, of_address: 2, write_time, ..LIMITS });
         let greedy = [127, 0, 0, 2];
         let ask = |_| {
             sleep(Duration::from_millis(50));
