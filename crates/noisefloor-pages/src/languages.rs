@@ -67,7 +67,7 @@ pub fn parse_language(text: &str, path: &Path) -> Result<Language, PagesError> {
 }
 
 /// Every text of the English file exists, with the same places to fill in, and no other.
-fn check(language: &Language, english: &Language, path: &Path) -> Result<(), PagesError> {
+pub fn check(language: &Language, english: &Language, path: &Path) -> Result<(), PagesError> {
     let bad = |what: String| PagesError::Language { path: path.to_owned(), what };
     for (name, text) in &english.text {
         let Some(own) = language.text.get(name) else {

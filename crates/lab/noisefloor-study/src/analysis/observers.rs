@@ -78,6 +78,12 @@ impl Observer {
         observer
     }
 
+    /// Validation: how often pairs of a class were called identical, and how often they were judged.
+    pub(super) fn called_identical(&self, class: Class) -> (usize, usize) {
+        let judged = || self.judged.iter().filter(|(_, c, _)| *c == class);
+        (judged().filter(|(.., identical)| *identical).count(), judged().count())
+    }
+
     /// Whether the observer answered anything that counts.
     pub(crate) fn has_answers(&self) -> bool {
         self.clicks > 0 || !self.stops.is_empty() || self.stage == Stage::ScreenedOut

@@ -101,12 +101,7 @@ pub struct ClassRow {
 /// The table; empty without answers.
 fn class_rows(observers: &[&Observer], seed: u64) -> Vec<ClassRow> {
     let row = |class: Class| {
-        let count = |o: &&Observer| {
-            let of = o.judged.iter().filter(|(_, c, _)| *c == class);
-            let identical = of.clone().filter(|(.., identical)| *identical);
-            (identical.count(), of.count())
-        };
-        let counts: Vec<(usize, usize)> = observers.iter().map(count).collect();
+        let counts: Vec<(usize, usize)> = observers.iter().map(|o| o.called_identical(class)).collect();
         let (identical, answers) = counts.iter().fold((0, 0), |(yes, of), c| (yes + c.0, of + c.1));
         if answers == 0 {
             return None;

@@ -55,9 +55,8 @@ pub fn individual(observer: &Observer, study: &Study) -> Vec<String> {
 /// Why the answers of a validation do not depend on the stimulus.
 fn blind(observer: &Observer) -> Option<String> {
     let share = |class: Class| {
-        let judged = || observer.judged.iter().filter(|(_, c, _)| *c == class);
-        let identical = judged().filter(|(.., identical)| *identical).count();
-        (judged().count() > 0).then(|| identical as f64 / judged().count() as f64)
+        let (identical, judged) = observer.called_identical(class);
+        (judged > 0).then(|| identical as f64 / judged as f64)
     };
     let (reference, noisy) = (share(Class::Reference)?, share(Class::Noisy)?);
     (noisy >= reference).then(|| {

@@ -89,7 +89,6 @@ struct StateView {
 #[derive(Serialize)]
 struct ModelView {
     digest: String,
-    corpus: String,
     evidence: Evidence,
 }
 
@@ -108,11 +107,7 @@ pub(crate) async fn state(State(app): Shared) -> Answer {
         people: setup.people,
         audience: [slope, offset],
         art_students: [students.slope, students.offset],
-        model: ModelView {
-            digest: setup.model.digest(),
-            corpus: setup.model.record().corpus.clone(),
-            evidence: setup.model.evidence(),
-        },
+        model: ModelView { digest: setup.model.digest(), evidence: setup.model.evidence() },
         retrained: app.job().model().is_some(),
         disagreements,
         database: setup.database.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),

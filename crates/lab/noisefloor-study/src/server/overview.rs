@@ -37,8 +37,6 @@ pub struct OverviewRow {
     pub group: String,
     /// `active`, `idle`, `paused`, `dropped-out`, `screened-out` or `finished`.
     pub state: String,
-    /// How far the observer has come.
-    pub stage: Stage,
     /// Trials answered, and in total.
     pub progress: (u32, u32),
     /// When it began, in milliseconds since 1970.
@@ -89,7 +87,6 @@ async fn row(app: &App, record: SessionRecord, now_ms: u64) -> Result<OverviewRo
         OverviewRow {
             ids,
             state: state.to_owned(),
-            stage: session.stage(),
             progress,
             begun_ms,
             last_ms,
