@@ -110,10 +110,7 @@ fn pictures_of(folder: &Path) -> Result<BTreeMap<String, (Picture, Places)>, Cor
                 pixels[(zone.y + i / zone.width) * width + zone.x + i % zone.width] = shown;
             }
         }
-        let place = |z: &ThresholdRow| {
-            let tile = Tile { index: z.zone as usize, x: z.x, y: z.y, width: z.width, height: z.height };
-            ((z.scene.clone(), z.zone), tile)
-        };
+        let place = |z: &ThresholdRow| ((z.scene.clone(), z.zone), z.tile());
         found.insert(scene.to_owned(), (Picture { width, pixels }, zones().map(place).collect()));
     }
     Ok(found)

@@ -12,6 +12,7 @@ use crate::corpus::{Corpus, JudgedImage as Image, JudgedZone};
 use crate::error::TableError;
 use crate::stimulus::as_noise;
 use crate::table::{Level, Origin, Table, Zone, first_word};
+pub use material::combine;
 use material::{Material, Shown, does_not_fit};
 use noisefloor::{
     Viewing,

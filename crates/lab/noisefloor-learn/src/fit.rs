@@ -166,6 +166,21 @@ fn weighed(table: &Table, params: &TrainParams) -> Vec<(usize, f64)> {
     numbers.map(|(number, name)| (number, growth(name).unwrap_or(0.0))).collect()
 }
 
+/// Predicts the zones of a group, at that share of people, by a model of the zones of `others`; and the C and γ chosen.
+pub(crate) fn predict_without(
+    table: &Table,
+    left_out: &str,
+    others: &[&str],
+    params: &TrainParams,
+    people: People,
+) -> Result<(Vec<Prediction>, SvmParams), TrainError> {
+    let (classifier, chosen) = fit_groups(table, others, params)?;
+    let known = familiarity(table, others, &classifier.scaler);
+    let model = parts(table, classifier, known, TrainingRecord::default());
+    let zones = table.zones.iter().filter(|z| z.group == left_out);
+    Ok((zones.map(|z| predict(|raw| model.judge(raw), people, z)).collect(), chosen))
+}
+
 /// Predictions with a pair of C and γ for the zones of `groups`, each group held out in turn.
 pub(crate) fn held_out(
     table: &Table,

@@ -38,10 +38,10 @@ pub use audience::{AudienceFit, AudienceFitError, MAX_PAIRS};
 pub use baselines::{constant_noise_baseline, scene_median_baseline};
 pub use choices::{Choice, VISIBLE_CHOICES, choices};
 pub use corpus::{
-    Corpus, CorpusError, Encoding, Inner, JudgedImage, JudgedImages, JudgedZone, Patch, ThresholdRow,
-    ZoneImages, zone_levels,
+    Corpus, CorpusError, Encoding, JudgedImage, JudgedImages, JudgedZone, Patch, ThresholdRow, ZoneImages,
+    zone_levels,
 };
-pub use describe::{Corpora, describe_corpora, describe_pairs};
+pub use describe::{Corpora, combine, describe_corpora, describe_pairs};
 pub use error::TableError;
 pub use evaluation::{Baselines, Evaluation, PredictionScores, SceneScores};
 pub use nested::{Chosen, choose_and_leave_out};

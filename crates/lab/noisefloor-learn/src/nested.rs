@@ -1,12 +1,12 @@
 //! Scores of a way to choose, not of one choice.
 
 use crate::choices::Choice;
-use crate::fit::{familiarity, fit_groups, held_out, parts};
+use crate::fit::{held_out, predict_without};
 use crate::params::{TrainError, TrainParams};
-use crate::predict::{Prediction, predict};
+use crate::predict::Prediction;
 use crate::score::score;
+use noisefloor::People;
 use noisefloor::svm::SvmParams;
-use noisefloor::{People, model::TrainingRecord};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -64,11 +64,8 @@ pub fn choose_and_leave_out(
         let best = chosen_of(&errors).ok_or(TrainError::Params)?;
         let Choice { name, table } = &choices[best];
 
-        let (classifier, SvmParams { c, gamma }) = fit_groups(table, &others, params)?;
-        let known = familiarity(table, &others, &classifier.scaler);
-        let model = parts(table, classifier, known, TrainingRecord::default());
-        let zones = table.zones.iter().filter(|z| z.group == left_out);
-        predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), people, z)));
+        let (predicted, SvmParams { c, gamma }) = predict_without(table, left_out, &others, params, people)?;
+        predictions.extend(predicted);
         let (without, choice, error_factor) = (left_out.to_owned(), name.clone(), errors[best].0);
         all_chosen.push(Chosen { without, choice, c, gamma, error_factor });
     }

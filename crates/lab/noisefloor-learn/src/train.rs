@@ -1,9 +1,9 @@
 //! Learning a model from a table of human thresholds, and scoring it on scenes it has not seen.
 
-use crate::fit::{familiarity, fit_groups, parts};
+use crate::fit::{familiarity, fit_groups, parts, predict_without};
 use crate::machine::examples;
 use crate::params::{TrainError, TrainParams};
-use crate::predict::{Prediction, predict};
+use crate::predict::Prediction;
 use crate::table::Table;
 use noisefloor::svm::SvmParams;
 use noisefloor::{
@@ -41,11 +41,7 @@ pub fn leave_one_scene_out(
     for &left_out in &groups {
         on_fold(left_out);
         let others: Vec<&str> = groups.iter().copied().filter(|&g| g != left_out).collect();
-        let (classifier, _) = fit_groups(table, &others, params)?;
-        let known = familiarity(table, &others, &classifier.scaler);
-        let model = parts(table, classifier, known, TrainingRecord::default());
-        let zones = table.zones.iter().filter(|z| z.group == left_out);
-        predictions.extend(zones.map(|z| predict(|raw| model.judge(raw), people, z)));
+        predictions.extend(predict_without(table, left_out, &others, params, people)?.0);
     }
     Ok(predictions)
 }

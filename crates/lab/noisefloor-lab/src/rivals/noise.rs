@@ -28,7 +28,7 @@
 //!   criterion that looks at a high quantile of it gets a laxer constant, by about the same factor in each scene.
 
 use noisefloor::{Rgb, display::srgb_decode};
-use noisefloor_learn::{Encoding, JudgedImage};
+use noisefloor_learn::{Encoding, JudgedImage, combine};
 
 /// The mean of some of the samples may amplify the rounding of 8-bit pictures by no more than this.
 const AMPLIFICATION: f64 = 8.0;
@@ -69,11 +69,11 @@ impl Noise {
                 running.clone_from(&image);
                 parts.push((last - level.first as f64, image));
             } else if level.first > 0 {
-                running = mix(&running, total / last, &image, samples / last);
+                running = combine(&running, total / last, &image, samples / last);
                 parts.push((samples, image));
             } else {
                 if last / samples <= AMPLIFICATION {
-                    parts.push((samples, mix(&image, last / samples, &running, -total / samples)));
+                    parts.push((samples, combine(&image, last / samples, &running, -total / samples)));
                 }
                 running = image;
             }
@@ -84,8 +84,8 @@ impl Noise {
         let width = patch.inner.width;
         let realisation = |(samples, mean): &(f64, Vec<Rgb>)| {
             let scale = (1.0 / samples - 1.0 / total).max(0.0).sqrt().recip();
-            let difference = mix(mean, scale, &running, -scale);
-            mix(&difference, 1.0, &local_means(&difference, width), -1.0)
+            let difference = combine(mean, scale, &running, -scale);
+            combine(&difference, 1.0, &local_means(&difference, width), -1.0)
         };
         let usable = parts.iter().filter(|(samples, _)| *samples <= 0.5 * total);
         // Each block has 64 signs for a batch
@@ -137,12 +137,6 @@ fn local_means(pixels: &[Rgb], width: usize) -> Vec<Rgb> {
     };
     let height = pixels.len() / width;
     transposed(&across(&transposed(&across(pixels, width), width), height), height)
-}
-
-fn mix(a: &[Rgb], fa: f64, b: &[Rgb], fb: f64) -> Vec<Rgb> {
-    let pixel =
-        |(a, b): (&Rgb, &Rgb)| std::array::from_fn(|c| (f64::from(a[c]) * fa + f64::from(b[c]) * fb) as f32);
-    a.iter().zip(b).map(pixel).collect()
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! The images of zones, cut out with a halo.
 
 use super::error::CorpusError;
-use super::table::ThresholdRow;
 use super::zone::{JudgedZone, ZoneImages};
-use noisefloor::{Rgb, internal::HALO};
+use noisefloor::{Rgb, Tile, internal::HALO};
 use noisefloor_image::{
     Frame, Picture, StackError, StackFault, batches, read_exr, read_picture, running_means,
 };
@@ -21,15 +20,6 @@ pub enum Encoding {
     Linear,
 }
 
-/// The zone inside a patch, in pixels of the patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Inner {
-    pub x: usize,
-    pub y: usize,
-    pub width: usize,
-    pub height: usize,
-}
-
 /// A zone's pixels, and up to [`HALO`] pixels around them where the image has any.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
@@ -39,13 +29,14 @@ pub struct Patch {
     pub height: usize,
     /// Row-major, `width * height` values.
     pub pixels: Vec<Rgb>,
-    pub inner: Inner,
+    /// The zone, in pixels of the patch.
+    pub inner: Tile,
 }
 
 impl Patch {
     /// The zone's own pixels, row-major, without the halo.
     pub fn inner_pixels(&self) -> impl Iterator<Item = Rgb> {
-        let Inner { x, y, width, height } = self.inner;
+        let Tile { x, y, width, height, .. } = self.inner;
         (y..y + height).flat_map(move |row| self.pixels[row * self.width + x..][..width].iter().copied())
     }
 }
@@ -138,12 +129,9 @@ impl<'a> JudgedImages<'a> {
         };
         for row in job.zones.iter().map(|zone| &zone.row) {
             // A batch is only the zone
-            let (x, y) = if job.batch { (0, 0) } else { (row.x, row.y) };
-            let (exact, inside) = (
-                (row.width, row.height) == size,
-                x.saturating_add(row.width) <= width && y.saturating_add(row.height) <= height,
-            );
-            if !inside || job.batch && !exact {
+            let zone = if job.batch { Tile { x: 0, y: 0, ..row.tile() } } else { row.tile() };
+            let exact = (row.width, row.height) == size;
+            if !is_inside(zone, size) || job.batch && !exact {
                 let (path, scene) = (path.clone(), row.scene.clone());
                 return Err(CorpusError::Zone { path, scene, zone: row.zone, width, height });
             }
@@ -154,7 +142,7 @@ impl<'a> JudgedImages<'a> {
                 last: job.frame.last,
                 encoding,
                 rounding: picture.rounding(),
-                patch: cut(pixels, size, Inner { x, y, width: row.width, height: row.height }, HALO),
+                patch: cut(pixels, size, zone, HALO),
             });
         }
         Ok(())
@@ -175,14 +163,13 @@ pub(super) fn reference(zones: &[&JudgedZone]) -> Result<Option<Vec<Patch>>, Cor
     let image = read_exr(&path).map_err(StackError::from)?;
     let (width, height) = (image.width, image.height);
     let cut_out = |zone: &&JudgedZone| {
-        let ThresholdRow { x, y, width: w, height: h, .. } = zone.row;
-        if x.saturating_add(w) > width || y.saturating_add(h) > height {
+        if !is_inside(zone.row.tile(), (width, height)) {
             let (path, scene) = (path.clone(), zone.row.scene.clone());
             return Err(CorpusError::Zone { path, scene, zone: zone.row.zone, width, height });
         }
         // A batch is only the zone
         let halo = if matches!(zone.stack, ZoneImages::Batches(_)) { 0 } else { HALO };
-        Ok(cut(&image.pixels, (width, height), Inner { x, y, width: w, height: h }, halo))
+        Ok(cut(&image.pixels, (width, height), zone.row.tile(), halo))
     };
     zones.iter().map(cut_out).collect::<Result<_, _>>().map(Some)
 }
@@ -203,8 +190,12 @@ impl Iterator for JudgedImages<'_> {
     }
 }
 
+fn is_inside(zone: Tile, (width, height): (usize, usize)) -> bool {
+    zone.x.saturating_add(zone.width) <= width && zone.y.saturating_add(zone.height) <= height
+}
+
 /// The rectangle and its halo, clipped to an image of the size given.
-fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner, halo: usize) -> Patch {
+fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Tile, halo: usize) -> Patch {
     let (left, top) = (zone.x.saturating_sub(halo), zone.y.saturating_sub(halo));
     let right = (zone.x + zone.width + halo).min(width);
     let bottom = (zone.y + zone.height + halo).min(height);
@@ -214,6 +205,6 @@ fn cut(pixels: &[Rgb], (width, height): (usize, usize), zone: Inner, halo: usize
         pixels: (top..bottom)
             .flat_map(|y| pixels[y * width + left..y * width + right].iter().copied())
             .collect(),
-        inner: Inner { x: zone.x - left, y: zone.y - top, ..zone },
+        inner: Tile { x: zone.x - left, y: zone.y - top, ..zone },
     }
 }

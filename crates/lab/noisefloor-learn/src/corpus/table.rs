@@ -3,7 +3,7 @@
 use super::error::CorpusError;
 use crate::stimulus::{REFERENCE, parse_reference};
 use csv::{ErrorKind, Position, ReaderBuilder, Trim};
-use noisefloor::tile::MAX_EDGE;
+use noisefloor::{Tile, tile::MAX_EDGE};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use std::collections::HashMap;
 use std::fs::File;
@@ -36,6 +36,14 @@ pub struct ThresholdRow {
     /// As given; by default that of the last running mean, or a clean one beside batches.
     #[serde(default, deserialize_with = "reference", skip_serializing_if = "Option::is_none")]
     pub reference_spp: Option<f64>,
+}
+
+impl ThresholdRow {
+    /// Where the zone lies in the full picture.
+    pub fn tile(&self) -> Tile {
+        let Self { x, y, width, height, .. } = *self;
+        Tile { index: 0, x, y, width, height }
+    }
 }
 
 fn reference<'a, D: Deserializer<'a>>(from: D) -> Result<Option<f64>, D::Error> {

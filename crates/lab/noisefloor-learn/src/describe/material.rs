@@ -43,7 +43,8 @@ pub(super) struct Material {
     real: Vec<Real>,
 }
 
-fn combine(a: &[Rgb], fa: f64, b: &[Rgb], fb: f64) -> Pixels {
+/// `fa`·a + `fb`·b of two pictures, pixel by pixel.
+pub fn combine(a: &[Rgb], fa: f64, b: &[Rgb], fb: f64) -> Vec<Rgb> {
     let pixel =
         |(a, b): (&Rgb, &Rgb)| std::array::from_fn(|c| (f64::from(a[c]) * fa + f64::from(b[c]) * fb) as f32);
     a.iter().zip(b).map(pixel).collect()
@@ -67,12 +68,6 @@ impl Material {
             material.reference = Some(patch.pixels.iter().map(|&p| Display::SRGB.encode(p)).collect());
         }
         Ok(material)
-    }
-
-    fn frame(patch: &Patch) -> ((usize, usize), Tile) {
-        let inner = patch.inner;
-        let tile = Tile { index: 0, x: inner.x, y: inner.y, width: inner.width, height: inner.height };
-        ((patch.width, patch.height), tile)
     }
 
     /// Running means that contain one another, in display values. Realisations are the first `a` samples and
@@ -120,10 +115,9 @@ impl Material {
             })
         };
         let real = images.iter().filter_map(real).collect();
-        let (size, tile) = Self::frame(&last.patch);
         Some(Self {
-            size,
-            tile,
+            size: (last.patch.width, last.patch.height),
+            tile: last.patch.inner,
             converged,
             converged_spp,
             reference: None,
@@ -172,7 +166,7 @@ impl Material {
         };
         let (a, b) = early?;
         let noise = [noise(&a), noise(&b)];
-        let (size, tile) = Self::frame(&last.patch);
+        let (size, tile) = ((last.patch.width, last.patch.height), last.patch.inner);
         Some(Self { size, tile, converged, converged_spp, reference: None, rounding: 0.0, noise, real })
     }
 

@@ -1,6 +1,7 @@
+use noisefloor::Tile;
 use noisefloor_image::{RenderLayers, StackError, StackFault, write_exr, write_png};
 use noisefloor_learn::CorpusError;
-use noisefloor_learn::{Corpus, Encoding, Inner, ZoneImages, zone_levels};
+use noisefloor_learn::{Corpus, Encoding, ZoneImages, zone_levels};
 use std::path::Path;
 
 const HEADER: &str = "scene,renderer,zone,x,y,width,height,human_spp,first_spp,last_spp\n";
@@ -55,7 +56,7 @@ fn running_means_with_halos() {
     // JudgedZone 1 is the top right quarter: halo to the left and below
     let patch = &level.patch;
     assert_eq!((patch.width, patch.height), (28, 28));
-    assert_eq!(patch.inner, Inner { x: 8, y: 0, width: 20, height: 20 });
+    assert_eq!(patch.inner, Tile { index: 0, x: 8, y: 0, width: 20, height: 20 });
     assert_eq!(patch.pixels[0], [12.0 / 255.0, 0.0, 1.0 / 255.0]);
     assert_eq!(patch.pixels[28 * 28 - 1], [39.0 / 255.0, 27.0 / 255.0, 1.0 / 255.0]);
     let inner: Vec<_> = patch.inner_pixels().collect();
@@ -94,7 +95,7 @@ fn batches_of_zones() {
     let order: Vec<_> = levels.iter().map(|l| (l.zone, l.first, l.last)).collect();
     assert_eq!(order, [(0, 0, 20), (0, 20, 60), (1, 0, 20), (1, 20, 60)]);
     assert!(levels.iter().all(|l| l.encoding == Encoding::Linear));
-    assert_eq!(levels[3].patch.inner, Inner { x: 0, y: 0, width: 16, height: 12 });
+    assert_eq!(levels[3].patch.inner, Tile { index: 0, x: 0, y: 0, width: 16, height: 12 });
     assert_eq!(levels[3].patch.pixels, [[2.0; 3]; 16 * 12]);
 }
 

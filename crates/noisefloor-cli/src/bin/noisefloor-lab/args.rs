@@ -11,6 +11,7 @@ pub mod study;
 mod train;
 
 pub use compare::CompareArgs;
+pub use data::check_data;
 pub use evaluate::EvaluateArgs;
 pub use explore::ExploreArgs;
 pub use reproduce::ReproduceArgs;

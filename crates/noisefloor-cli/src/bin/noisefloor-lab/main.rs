@@ -32,7 +32,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Compare(args) => compare::run(args.check()?),
         Command::Reproduce(args) => reproduce::run(args).map(done),
-        Command::Train(args) => train::run(&args.check()?).map(done),
+        Command::Train(args) => train::run(args).map(done),
         Command::Evaluate(args) => evaluate::run(&args.check()?).map(done),
         Command::Audience(args) => audience::run(args).map(done),
         Command::Explore(args) => explore::run(args.check()?).map(done),

@@ -1,7 +1,7 @@
 use super::super::rendering::stages;
 use super::*;
-use noisefloor::{Film, TileGrid, display::luminance};
-use noisefloor_learn::{Inner, Patch};
+use noisefloor::{Film, Tile, TileGrid, display::luminance};
+use noisefloor_learn::Patch;
 
 const EDGE: usize = 200;
 const MEAN: f64 = 0.5;
@@ -18,7 +18,7 @@ fn grey(samples: f64, noise: &mut fastrand::Rng) -> Vec<Rgb> {
 }
 
 fn image(first: u64, last: u64, pixels: Vec<Rgb>) -> JudgedImage {
-    let inner = Inner { x: 0, y: 0, width: EDGE, height: EDGE };
+    let inner = Tile { index: 0, x: 0, y: 0, width: EDGE, height: EDGE };
     let patch = Patch { width: EDGE, height: EDGE, pixels, inner };
     let (scene, encoding) = ("s".into(), Encoding::Linear);
     JudgedImage { scene, zone: 3, first, last, encoding, rounding: 0.0, patch }
@@ -135,7 +135,7 @@ fn realisations_in_turns_lose_noise() {
         let seen = follow(&noise, |turn, samples| {
             let sign = if (turn / count as usize).is_multiple_of(2) { 1.0 } else { -1.0 };
             let realisation = &noise.realisations[turn % count as usize];
-            mix(&noise.converged, 1.0, realisation, sign / (samples as f64).sqrt())
+            combine(&noise.converged, 1.0, realisation, sign / (samples as f64).sqrt())
         });
         let late: Vec<f64> = seen.iter().skip(10).map(|seen| seen.mean).collect();
         let least = late.iter().copied().fold(f64::INFINITY, f64::min);

@@ -50,7 +50,7 @@ pub enum MachineChoice {
 }
 
 /// What to learn from or to score, and how to train on it.
-pub(super) fn check_data(data: DataArgs, search: SearchArgs) -> anyhow::Result<(DataJob, SearchJob)> {
+pub fn check_data(data: DataArgs, search: SearchArgs) -> anyhow::Result<(DataJob, SearchJob)> {
     let source = match data.table {
         Some(path) => DataSource::Table(path),
         None => DataSource::Corpora(data.corpus),

@@ -17,38 +17,23 @@ use std::path::PathBuf;
   noisefloor-lab train --table fixtures/human-table.csv --disagreements explore.sqlite --out my.nfm")]
 pub struct TrainArgs {
     #[command(flatten)]
-    data: DataArgs,
+    pub data: DataArgs,
     /// Model file to write.
     #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    pub out: PathBuf,
     /// Also write the table of descriptors; `--table` trains from it without the pictures.
     #[arg(long, value_name = "FILE.csv")]
-    save_table: Option<PathBuf>,
+    pub save_table: Option<PathBuf>,
     /// Also write the numbers for every choice of constants in the descriptor, for `evaluate --nested`.
     #[arg(long, value_name = "FILE.csv", requires = "corpus")]
-    save_choices: Option<PathBuf>,
+    pub save_choices: Option<PathBuf>,
     /// Learn from the disagreements that `explore` keeps in this database, too. Each counts as much as the
     /// levels of a zone within a factor of two in samples. Prints the scores before and after.
     #[arg(long, value_name = "FILE.sqlite", conflicts_with = "no_scores")]
-    disagreements: Option<PathBuf>,
+    pub disagreements: Option<PathBuf>,
     /// Do not score on left-out scenes; the model's record then has no scores.
     #[arg(long)]
-    no_scores: bool,
+    pub no_scores: bool,
     #[command(flatten)]
-    search: SearchArgs,
-}
-
-impl TrainArgs {
-    pub fn check(self) -> anyhow::Result<crate::train::TrainJob> {
-        let (data, search) = super::data::check_data(self.data, self.search)?;
-        Ok(crate::train::TrainJob {
-            data,
-            search,
-            out: self.out,
-            save_table: self.save_table,
-            save_choices: self.save_choices,
-            disagreements: self.disagreements,
-            scores: !self.no_scores,
-        })
-    }
+    pub search: SearchArgs,
 }
