@@ -1,9 +1,11 @@
 """Error against time: how relMSE falls while the oracle stops tiles, and while all tiles get the same.
 
-    python examples/8-python/error_against_time.py
+    python examples/8-python/error_against_time.py [plot.svg]
 
-Time is counted in samples per pixel, which is what a renderer spends.
+Time is counted in samples per pixel, which is what a renderer spends. The plot needs matplotlib.
 """
+
+import sys
 
 import numpy as np
 
@@ -36,6 +38,15 @@ def run(adaptive):
     return curve
 
 
-for name, adaptive in {"all tiles alike": False, "the oracle stops tiles": True}.items():
-    curve = run(adaptive)
+curves = {"all tiles alike": run(adaptive=False), "the oracle stops tiles": run(adaptive=True)}
+for name, curve in curves.items():
     print(name, *(f"{error:.2e} after {samples:6.1f} samples per pixel" for samples, error in curve), sep="\n  ")
+if len(sys.argv) > 1:
+    from matplotlib import pyplot
+
+    for name, curve in curves.items():
+        pyplot.loglog(*zip(*curve), marker=".", label=name)
+    pyplot.xlabel("samples per pixel")
+    pyplot.ylabel("relMSE")
+    pyplot.legend()
+    pyplot.savefig(sys.argv[1])
