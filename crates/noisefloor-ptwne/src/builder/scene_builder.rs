@@ -132,23 +132,9 @@ impl SceneBuilder {
         self.single(Shape::Planar { corner, e1, e2, whole: true }, Some(uvs), NO, material, emission)
     }
 
-    /// Adds an ellipse: `centre` + u·`e1` + v·`e2` for u² + v² ≤ 1. Texture coordinates are (u + 1, v + 1)/2.
+    /// Adds an ellipse: `centre` + a·`e1` + b·`e2` for a² + b² ≤ 1. Texture coordinates run in rings: u = √(a² + b²), and
+    /// v = 1 − φ/2π, where φ is the angle of (a, b); φ/2π if `reversed`.
     pub fn disk(
-        &mut self,
-        centre: [f32; 3],
-        e1: [f32; 3],
-        e2: [f32; 3],
-        material: MaterialId,
-        emission: Option<Emission>,
-    ) -> Result<(), SceneError> {
-        let [centre, e1, e2] = [position(centre)?, position(e1)?, position(e2)?];
-        let uvs = [[0.5, 0.5], [1.0, 0.5], [0.5, 1.0]];
-        self.single(Shape::Disk { centre, e1, e2 }, Some(uvs), NO, material, emission)
-    }
-
-    /// Adds an ellipse with texture coordinates in rings: u = √(a² + b²) at `centre` + a·`e1` + b·`e2`, and v
-    /// = 1 − φ/2π, where φ is the angle of (a, b); φ/2π if `reversed`.
-    pub fn ringed_disk(
         &mut self,
         centre: [f32; 3],
         [e1, e2]: [[f32; 3]; 2],

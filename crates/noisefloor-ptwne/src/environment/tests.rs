@@ -6,6 +6,12 @@ use crate::math::{self, Vec3};
 use crate::rng::{Key, Rng};
 use noisefloor::Rgb;
 
+/// A map as it lies.
+fn map(width: usize, height: usize, pixels: Vec<Rgb>, poles: bool) -> Map {
+    let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    Map::new(EnvironmentMap { width, height, pixels, to_world, poles })
+}
+
 fn uneven() -> Map {
     let mut rng = Rng::new(Key::new(1), 0, 0);
     let pixels: Vec<Rgb> = (0..16 * 8).map(|_| [rng.one().powi(6); 3]).collect();
@@ -50,8 +56,7 @@ fn maps_are_the_right_way_round() {
     // Brightest pixel: column 0 of 8, row 0 of 4: toward −z turned a little to +x, and up
     let mut pixels = vec![[0.0; 3]; 32];
     pixels[0] = [1.0; 3];
-    let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let map = Map::new(EnvironmentMap { width: 8, height: 4, pixels, to_world, poles: false });
+    let map = map(8, 4, pixels, false);
     let (u, v) = (0.5 / 8.0 * std::f32::consts::TAU, 0.5 / 4.0 * std::f32::consts::PI);
     let dir = Vec3::new(u.sin() * v.sin(), v.cos(), -u.cos() * v.sin());
     assert!((map.radiance(dir).x - 1.0).abs() < 1e-5);
@@ -63,8 +68,7 @@ fn maps_are_the_right_way_round() {
 #[test]
 fn rows_may_reach_from_pole_to_pole() {
     let pixels = (0..32).map(|i| [(i / 8) as f32; 3]).collect();
-    let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let map = Map::new(EnvironmentMap { width: 8, height: 4, pixels, to_world, poles: true });
+    let map = map(8, 4, pixels, true);
     for k in 0..=16 {
         let angle = k as f32 / 16.0 * std::f32::consts::PI;
         let seen = map.radiance(Vec3::new(0.0, angle.cos(), angle.sin())).x;
@@ -89,8 +93,7 @@ fn large_maps_are_sampled_by_cells() {
     let (width, height) = (1500, 601);
     let mut pixels = vec![[0.0; 3]; width * height];
     pixels[300 * width + 1022] = [1.0; 3];
-    let to_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let map = Map::new(EnvironmentMap { width, height, pixels, to_world, poles: false });
+    let map = map(width, height, pixels, false);
     let mut rng = Rng::new(Key::new(3), 0, 0);
     let n = 100_000;
     let values = (0..n).map(|_| {

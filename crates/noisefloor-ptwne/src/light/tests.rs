@@ -45,15 +45,8 @@ impl Draw {
             4 => return Light::punctual(Punctual::Point { position, intensity }).unwrap(),
             _ => {
                 let direction = self.direction().to_array();
-                let (inner, outer) = (10.0, 10.0 + 80.0 * self.0.one());
-                let spot = Punctual::Spot {
-                    position,
-                    direction,
-                    intensity,
-                    inner,
-                    outer,
-                    falloff: Falloff::Squared,
-                };
+                let (inner, outer, falloff) = (10.0, 10.0 + 80.0 * self.0.one(), Falloff::Squared);
+                let spot = Punctual::Spot { position, direction, intensity, inner, outer, falloff };
                 return Light::punctual(spot).unwrap();
             }
         };

@@ -1,14 +1,13 @@
 //! Mirrors, glass and caustics.
 
 use super::kit::{Kit, emission, look_at};
-use crate::{Material, Scene, SceneError, Texture};
+use crate::{Material, Scene, SceneError};
 
 /// Balls of glass and mirror in a box, with caustics.
 pub(super) fn caustics(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([0.0, 1.25, 4.35], [0.0, 0.92, 0.0], 36.5))?;
     let white = k.diffuse([0.74, 0.73, 0.70])?;
-    let floor = Texture::Checker { colours: [[0.70, 0.68, 0.62], [0.30, 0.29, 0.30]], scale: [2.5, 2.5] };
-    let floor = k.diffuse(floor)?;
+    let floor = k.checker([[0.70, 0.68, 0.62], [0.30, 0.29, 0.30]], [2.5, 2.5])?;
     let (ochre, teal) = (k.diffuse([0.66, 0.42, 0.13])?, k.diffuse([0.10, 0.36, 0.42])?);
     let glass = k.material(Material::Glass { ior: 1.5, tint: [0.98, 0.99, 0.98] })?;
     let amber = k.material(Material::Glass { ior: 1.45, tint: [0.95, 0.66, 0.30] })?;
@@ -34,8 +33,7 @@ pub(super) fn caustics(name: &str) -> Result<Scene, SceneError> {
 pub(super) fn plates(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([0.0, 2.6, 8.6], [0.0, 1.35, 0.0], 32.0))?;
     let wall = k.diffuse([0.42, 0.42, 0.44])?;
-    let tiles = Texture::Checker { colours: [[0.34, 0.34, 0.36], [0.22, 0.22, 0.24]], scale: [1.5, 1.5] };
-    let tiles = k.diffuse(tiles)?;
+    let tiles = k.checker([[0.34, 0.34, 0.36], [0.22, 0.22, 0.24]], [1.5, 1.5])?;
     let black = k.diffuse([0.0; 3])?;
     k.floor(0.0, [-9.0, 9.0], [-2.4, 9.5], true, tiles, None);
     k.wall([-9.0, -2.4], [9.0, -2.4], [0.0, 7.0], wall);

@@ -1,21 +1,15 @@
 //! Halls: an arcade of brick and checkers, and a market under many lanterns.
 
 use super::kit::{Kit, emission, look_at};
-use crate::{Environment, Scene, SceneError, Sun, Texture};
+use crate::{Environment, Scene, SceneError, Sun};
 
 /// A hall with two arcades and an open roof: the sun falls in from above.
-// Longer than 60 lines: one list of what stands where.
-// Long: a list of what stands in the scene
 pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([0.35, 1.7, 8.6], [-0.25, 2.1, 0.0], 55.0))?;
-    let floor = Texture::Checker { colours: [[0.58, 0.54, 0.47], [0.24, 0.20, 0.18]], scale: [1.0, 1.0] };
-    let floor = k.diffuse(floor)?;
-    let brick = Texture::Brick { brick: [0.58, 0.33, 0.22], mortar: [0.60, 0.57, 0.52], scale: [1.7, 4.0] };
-    let brick = k.diffuse(brick)?;
-    let plaster = Texture::Noise { colours: [[0.58, 0.50, 0.40], [0.76, 0.69, 0.58]], scale: [1.1, 1.1] };
-    let plaster = k.diffuse(plaster)?;
-    let marble = Texture::Noise { colours: [[0.52, 0.48, 0.43], [0.78, 0.74, 0.68]], scale: [6.0, 1.2] };
-    let marble = k.diffuse(marble)?;
+    let floor = k.checker([[0.58, 0.54, 0.47], [0.24, 0.20, 0.18]], [1.0, 1.0])?;
+    let brick = k.brick([[0.58, 0.33, 0.22], [0.60, 0.57, 0.52]], [1.7, 4.0])?;
+    let plaster = k.noise([[0.58, 0.50, 0.40], [0.76, 0.69, 0.58]], [1.1, 1.1])?;
+    let marble = k.noise([[0.52, 0.48, 0.43], [0.78, 0.74, 0.68]], [6.0, 1.2])?;
     let cloths = [[0.55, 0.08, 0.07], [0.09, 0.22, 0.45], [0.12, 0.34, 0.14]];
     let cloths = [k.diffuse(cloths[0])?, k.diffuse(cloths[1])?, k.diffuse(cloths[2])?];
     let bronze = k.metal([0.70, 0.50, 0.28], 0.25)?;
@@ -88,14 +82,10 @@ pub(super) fn arcade(name: &str) -> Result<Scene, SceneError> {
 }
 
 /// A market street at night, under more than a hundred lanterns of many colours.
-// Longer than 60 lines: one list of what stands where.
-// Long: a list of what stands in the scene
 pub(super) fn lanterns(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([0.1, 1.8, 7.0], [0.0, 1.55, 0.0], 46.0))?;
-    let cobbles = Texture::Brick { brick: [0.42, 0.40, 0.39], mortar: [0.20, 0.19, 0.18], scale: [2.6, 4.0] };
-    let cobbles = k.diffuse(cobbles)?;
-    let brick = Texture::Brick { brick: [0.60, 0.38, 0.28], mortar: [0.55, 0.45, 0.42], scale: [2.0, 4.5] };
-    let brick = k.diffuse(brick)?;
+    let cobbles = k.brick([[0.42, 0.40, 0.39], [0.20, 0.19, 0.18]], [2.6, 4.0])?;
+    let brick = k.brick([[0.60, 0.38, 0.28], [0.55, 0.45, 0.42]], [2.0, 4.5])?;
     let plaster = k.diffuse([0.62, 0.56, 0.46])?;
     let wood = k.diffuse([0.36, 0.22, 0.12])?;
     let dark = k.diffuse([0.05, 0.05, 0.06])?;

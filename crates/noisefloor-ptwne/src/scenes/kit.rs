@@ -50,6 +50,22 @@ impl Kit {
         self.builder.material(Material::Diffuse { albedo: albedo.into() })
     }
 
+    pub(super) fn checker(&mut self, colours: [Rgb; 2], scale: [f32; 2]) -> Result<MaterialId, SceneError> {
+        self.diffuse(Texture::Checker { colours, scale })
+    }
+
+    pub(super) fn noise(&mut self, colours: [Rgb; 2], scale: [f32; 2]) -> Result<MaterialId, SceneError> {
+        self.diffuse(Texture::Noise { colours, scale })
+    }
+
+    pub(super) fn brick(
+        &mut self,
+        [brick, mortar]: [Rgb; 2],
+        scale: [f32; 2],
+    ) -> Result<MaterialId, SceneError> {
+        self.diffuse(Texture::Brick { brick, mortar, scale })
+    }
+
     pub(super) fn metal(&mut self, colour: Rgb, roughness: f32) -> Result<MaterialId, SceneError> {
         self.builder.material(Material::RoughConductor { reflectance: colour.into(), roughness })
     }
@@ -159,15 +175,7 @@ impl Kit {
                 indices.extend([[a, a + 2, a + 1], [a + 1, a + 2, a + 3]]);
             }
         }
-        self.mesh(
-            &Mesh {
-                positions: &positions,
-                normals: &normals,
-                uvs: &uvs,
-                indices: &indices,
-                ..Mesh::default()
-            },
-            m,
-        );
+        let (positions, normals, uvs, indices) = (&positions, &normals, &uvs, &indices);
+        self.mesh(&Mesh { positions, normals, uvs, indices, ..Mesh::default() }, m);
     }
 }

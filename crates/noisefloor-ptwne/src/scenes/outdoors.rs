@@ -1,19 +1,14 @@
 //! Under the sky.
 
 use super::kit::{Kit, look_at};
-use crate::{Environment, Scene, SceneError, Sun, Texture};
+use crate::{Environment, Scene, SceneError, Sun};
 
 /// A court with steps, an arcade and a well, in sun and sky.
-// Longer than 60 lines: one list of what stands where.
-// Long: a list of what stands in the scene
 pub(super) fn courtyard(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([5.2, 2.5, 8.4], [-0.5, 1.55, 0.0], 42.0))?;
-    let paving = Texture::Checker { colours: [[0.36, 0.33, 0.29], [0.28, 0.26, 0.24]], scale: [1.0, 1.0] };
-    let paving = k.diffuse(paving)?;
-    let brick = Texture::Brick { brick: [0.52, 0.23, 0.15], mortar: [0.55, 0.52, 0.47], scale: [2.2, 5.0] };
-    let brick = k.diffuse(brick)?;
-    let plaster = Texture::Noise { colours: [[0.62, 0.55, 0.44], [0.76, 0.70, 0.60]], scale: [1.5, 1.5] };
-    let plaster = k.diffuse(plaster)?;
+    let paving = k.checker([[0.36, 0.33, 0.29], [0.28, 0.26, 0.24]], [1.0, 1.0])?;
+    let brick = k.brick([[0.52, 0.23, 0.15], [0.55, 0.52, 0.47]], [2.2, 5.0])?;
+    let plaster = k.noise([[0.62, 0.55, 0.44], [0.76, 0.70, 0.60]], [1.5, 1.5])?;
     let stone = k.diffuse([0.56, 0.54, 0.50])?;
     let roof = k.diffuse([0.40, 0.15, 0.09])?;
     let leaf = k.diffuse([0.10, 0.24, 0.06])?;

@@ -1,16 +1,14 @@
 //! Rooms: a small light, a large light, and light from behind a door.
 
 use super::kit::{Kit, emission, look_at};
-use crate::{Material, Scene, SceneError, Texture};
+use crate::{Material, Scene, SceneError};
 
 /// A desk in a dim corner, under a bulb.
 pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([0.15, 1.75, 4.1], [0.0, 0.78, 0.0], 36.0))?;
     let wall = k.diffuse([0.52, 0.56, 0.58])?;
-    let boards = Texture::Noise { colours: [[0.30, 0.17, 0.09], [0.55, 0.36, 0.20]], scale: [1.2, 14.0] };
-    let boards = k.diffuse(boards)?;
-    let wood = Texture::Noise { colours: [[0.42, 0.26, 0.14], [0.66, 0.46, 0.28]], scale: [9.0, 1.0] };
-    let wood = k.diffuse(wood)?;
+    let boards = k.noise([[0.30, 0.17, 0.09], [0.55, 0.36, 0.20]], [1.2, 14.0])?;
+    let wood = k.noise([[0.42, 0.26, 0.14], [0.66, 0.46, 0.28]], [9.0, 1.0])?;
     let clay = k.diffuse([0.62, 0.28, 0.16])?;
     let cream = k.diffuse([0.80, 0.76, 0.66])?;
     let blue = k.diffuse([0.12, 0.22, 0.46])?;
@@ -60,8 +58,7 @@ pub(super) fn bulb(name: &str) -> Result<Scene, SceneError> {
 pub(super) fn softbox(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([0.0, 1.5, 5.4], [0.0, 0.72, 0.0], 37.0))?;
     let paper = k.diffuse([0.55, 0.55, 0.57])?;
-    let checker = Texture::Checker { colours: [[0.65, 0.65, 0.62], [0.12, 0.13, 0.16]], scale: [4.0, 4.0] };
-    let checker = k.diffuse(checker)?;
+    let checker = k.checker([[0.65, 0.65, 0.62], [0.12, 0.13, 0.16]], [4.0, 4.0])?;
     let red = k.diffuse([0.60, 0.09, 0.07])?;
     let white = k.diffuse([0.8; 3])?;
     let copper = [0.95, 0.64, 0.54];
@@ -102,8 +99,7 @@ pub(super) fn door(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([1.3, 1.45, 3.75], [-0.1, 0.95, -0.6], 48.0))?;
     let wall = k.diffuse([0.78, 0.75, 0.68])?;
     let hall = k.diffuse([0.85, 0.85, 0.84])?;
-    let floor = Texture::Checker { colours: [[0.62, 0.58, 0.50], [0.26, 0.20, 0.15]], scale: [2.5, 2.5] };
-    let floor = k.diffuse(floor)?;
+    let floor = k.checker([[0.62, 0.58, 0.50], [0.26, 0.20, 0.15]], [2.5, 2.5])?;
     let wood = k.diffuse([0.46, 0.28, 0.15])?;
     let (red, blue) = (k.diffuse([0.62, 0.13, 0.09])?, k.diffuse([0.14, 0.27, 0.52])?);
     let steel = k.metal([0.80, 0.82, 0.84], 0.15)?;

@@ -2,7 +2,7 @@
 //! that f32 cannot hold, and divisions by zero.
 
 use super::kit::{Kit, P, emission, look_at};
-use crate::{Environment, Material, Mesh, Scene, SceneError, Sun, Texture};
+use crate::{Environment, Material, Mesh, Scene, SceneError, Sun};
 use std::f32::consts::PI;
 
 /// A glass ball and a glass block between a small lamp and the floor. Only scattered rays find the lamp
@@ -27,8 +27,7 @@ pub(super) fn caustic(name: &str) -> Result<Scene, SceneError> {
 pub(super) fn keyhole(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([1.5, 1.3, 3.4], [-0.35, 0.8, 0.0], 48.0))?;
     let wall = k.diffuse([0.75, 0.73, 0.70])?;
-    let boards = Texture::Noise { colours: [[0.34, 0.22, 0.13], [0.52, 0.36, 0.22]], scale: [1.2, 14.0] };
-    let boards = k.diffuse(boards)?;
+    let boards = k.noise([[0.34, 0.22, 0.13], [0.52, 0.36, 0.22]], [1.2, 14.0])?;
     let door = k.diffuse([0.40, 0.25, 0.14])?;
     let (red, blue) = (k.diffuse([0.62, 0.13, 0.09])?, k.diffuse([0.14, 0.27, 0.52])?);
     let black = k.diffuse([0.0; 3])?;
@@ -60,8 +59,7 @@ pub(super) fn keyhole(name: &str) -> Result<Scene, SceneError> {
 /// A still life under a lamp of radius 1e-4.
 pub(super) fn pinpoint(name: &str) -> Result<Scene, SceneError> {
     let mut k = Kit::new(name, look_at([0.0, 1.6, 4.2], [0.0, 0.6, 0.0], 38.0))?;
-    let floor = Texture::Checker { colours: [[0.62, 0.60, 0.55], [0.34, 0.32, 0.30]], scale: [2.0, 2.0] };
-    let floor = k.diffuse(floor)?;
+    let floor = k.checker([[0.62, 0.60, 0.55], [0.34, 0.32, 0.30]], [2.0, 2.0])?;
     let white = k.diffuse([0.75; 3])?;
     let orange = k.diffuse([0.70, 0.34, 0.10])?;
     let brass = k.metal([0.90, 0.68, 0.34], 0.2)?;

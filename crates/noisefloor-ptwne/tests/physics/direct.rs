@@ -63,14 +63,8 @@ fn panel() -> f64 {
 #[test]
 fn a_rectangle_lights_by_its_form_factor() {
     let scene = lit(|b, m| {
-        b.parallelogram(
-            [-0.5, 2.0, -1.0],
-            [2.0, 0.0, 0.0],
-            [0.0, 0.0, 1.5],
-            m,
-            Some(Emission::front([3.0; 3])),
-        )
-        .unwrap();
+        let light = Some(Emission::front([3.0; 3]));
+        b.parallelogram([-0.5, 2.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 1.5], m, light).unwrap();
     });
     check(&scene, 0.5 * 3.0 * panel());
     check_brute_force(&scene, 0.5 * 3.0 * panel());
@@ -79,11 +73,7 @@ fn a_rectangle_lights_by_its_form_factor() {
 #[test]
 fn triangles_light_like_the_rectangle_they_make() {
     let positions = [[-0.5, 2.0, -1.0], [1.5, 2.0, -1.0], [1.5, 2.0, 0.5], [-0.5, 2.0, 0.5]];
-    let mesh = noisefloor_ptwne::Mesh {
-        positions: &positions,
-        indices: &[[0, 1, 2], [0, 2, 3]],
-        ..Default::default()
-    };
+    let mesh = Mesh { positions: &positions, indices: &[[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
     let scene = lit(|b, m| assert_eq!(b.mesh(&mesh, m, Some(Emission::front([3.0; 3]))), Ok(0)));
     check(&scene, 0.5 * 3.0 * panel());
 }
@@ -131,8 +121,9 @@ fn ellipse(centre: [f64; 3], e1: [f64; 3], e2: [f64; 3], normal: [f64; 3]) -> f6
 #[test]
 fn discs_light_by_their_form_factor() {
     let light = || Some(Emission::front([3.0; 3]));
-    let round =
-        |r: f32| lit(|b, m| b.disk([0.0, 2.0, 0.0], [r, 0.0, 0.0], [0.0, 0.0, r], m, light()).unwrap());
+    let round = |r: f32| {
+        lit(|b, m| b.disk([0.0, 2.0, 0.0], [[r, 0.0, 0.0], [0.0, 0.0, r]], false, m, light()).unwrap())
+    };
     let closed = 0.5 * 3.0 * 0.64 / 4.64;
     let summed = ellipse([0.0, 2.0, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 0.8], [0.0, -1.0, 0.0]);
     assert!((0.5 * 3.0 * summed - closed).abs() < 1e-4 * closed);
@@ -140,7 +131,7 @@ fn discs_light_by_their_form_factor() {
     check_brute_force(&round(0.8), closed);
     check(&round(0.01), 0.5 * 3.0 * 1e-4 / 4.0001);
     let aslant = lit(|b, m| {
-        b.disk([0.7, 1.5, -0.4], [0.6, 0.3, 0.0], [0.0, 0.0, 0.3], m, light()).unwrap();
+        b.disk([0.7, 1.5, -0.4], [[0.6, 0.3, 0.0], [0.0, 0.0, 0.3]], false, m, light()).unwrap();
     });
     // e1 × e2 = (0.09, −0.18, 0)
     let normal = [1.0 / 5f64.sqrt(), -2.0 / 5f64.sqrt(), 0.0];
@@ -192,16 +183,9 @@ fn many_lights_add_up() {
         let fade = if spot { ((down - 0.5) / 0.5).clamp(0.0, 1.0).powi(2) } else { 1.0 };
         expected += intensity * fade * position[1].max(0.0) / d2.powf(1.5);
         let (position, intensity) = ([x, y, z], [intensity as f32; 3]);
-        let direction = [0.0, -1.0, 0.0];
+        let (direction, inner, outer, falloff) = ([0.0, -1.0, 0.0], 0.0, 60.0, Falloff::Squared);
         lights.push(match spot {
-            true => Punctual::Spot {
-                position,
-                direction,
-                intensity,
-                inner: 0.0,
-                outer: 60.0,
-                falloff: Falloff::Squared,
-            },
+            true => Punctual::Spot { position, direction, intensity, inner, outer, falloff },
             false => Punctual::Point { position, intensity },
         });
     }

@@ -35,17 +35,9 @@ fn tiny_bright_lights_and_grazing_cameras_stay_finite() {
                     .unwrap();
                 b.sphere([-0.4, 0.5, 0.0], size, rough, light).unwrap();
                 let needle = [[0.0; 3], [1.0, 1e-7, 0.0], [2.0, 1.5e-7, 0.0]];
-                b.mesh(
-                    &Mesh {
-                        positions: &needle,
-                        normals: &[[0.0, -1.0, 1e-20]; 3],
-                        indices: &[[0, 1, 2]],
-                        ..Mesh::default()
-                    },
-                    floor,
-                    None,
-                )
-                .unwrap();
+                let (positions, normals) = (&needle, &[[0.0, -1.0, 1e-20]; 3]);
+                let mesh = Mesh { positions, normals, indices: &[[0, 1, 2]], ..Mesh::default() };
+                b.mesh(&mesh, floor, None).unwrap();
                 let sun = Sun { direction: [0.0, -1e-30, 1.0], angular_radius: 0.01, radiance: [1e12; 3] };
                 b.environment(Environment { sun: Some(sun), ..Environment::constant([1.0; 3]) }).unwrap();
             }),

@@ -107,7 +107,8 @@ fn two_ways(smooth: bool, places: &[DAffine3], ball: bool) -> [Scene; 2] {
                     b.sphere(at.to_array(), 0.3 * size as f32, grey, None).unwrap();
                     let at = |p| m.transform_point3(p).as_vec3();
                     let (c, e1, e2) = (at(DVec3::X), at(DVec3::ONE), at(DVec3::new(1.0, -0.5, 1.0)));
-                    b.disk(c.to_array(), (e1 - c).to_array(), (e2 - c).to_array(), grey, None).unwrap();
+                    let edges = [e1 - c, e2 - c].map(|edge| edge.to_array());
+                    b.disk(c.to_array(), edges, false, grey, None).unwrap();
                 }
             };
             if shared {
@@ -175,14 +176,8 @@ fn the_same_samples_agree() {
         let scene = scene(look([0.5, 3.0, 9.0], [0.0; 3], UP, 40.0), |b| {
             let m = b.material(Material::diffuse([0.6, 0.5, 0.4])).unwrap();
             b.environment(Environment::constant([0.2, 0.3, 0.4])).unwrap();
-            b.parallelogram(
-                [-1.0, 6.0, -1.0],
-                [2.0, 0.0, 0.0],
-                [0.0, 0.0, 2.0],
-                m,
-                Some(Emission::front([9.0; 3])),
-            )
-            .unwrap();
+            let light = Some(Emission::front([9.0; 3]));
+            b.parallelogram([-1.0, 6.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], m, light).unwrap();
             if shared {
                 b.begin_object().unwrap();
                 Sheet::new().add(b, false, m);
@@ -221,12 +216,9 @@ fn stretched_spheres_are_ellipsoids() {
             b.begin_object().unwrap();
             b.sphere([7.0, 8.0, 9.0], 2.0, m, None).unwrap();
             let object = b.end_object().unwrap();
-            let matrix = DAffine3::from_mat3_translation(turn * DMat3::from_diagonal(axes), middle)
-                * DAffine3::from_scale_rotation_translation(
-                    DVec3::splat(0.5),
-                    Default::default(),
-                    -DVec3::new(3.5, 4.0, 4.5),
-                );
+            let unit = DAffine3::from_scale(DVec3::splat(0.5))
+                * DAffine3::from_translation(-DVec3::new(7.0, 8.0, 9.0));
+            let matrix = DAffine3::from_mat3_translation(turn * DMat3::from_diagonal(axes), middle) * unit;
             b.instance(object, rows(&matrix)).unwrap();
         });
         assert_eq!((scene.surfaces(), scene.instances()), (1, 1));

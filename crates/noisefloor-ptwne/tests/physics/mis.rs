@@ -84,7 +84,7 @@ fn lights_of_all_shapes() -> Scene {
             match i % 4 {
                 0 => b.sphere(at, 0.3, grey, Some(light)).unwrap(),
                 1 => b.parallelogram(at, e1, e2, grey, Some(light)).unwrap(),
-                2 => b.disk(at, e1.map(|x| 0.5 * x), e2, grey, Some(light)).unwrap(),
+                2 => b.disk(at, [e1.map(|x| 0.5 * x), e2], false, grey, Some(light)).unwrap(),
                 _ => {
                     let to = |e: [f32; 3]| std::array::from_fn(|k| at[k] + e[k]);
                     let mesh =

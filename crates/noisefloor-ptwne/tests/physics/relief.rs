@@ -53,7 +53,7 @@ fn a_map_of_the_normal_itself_changes_nothing() {
                 floor(b, Material::diffuse([0.5; 3]), relief.clone());
                 let m = b.material_with(material.clone(), self::with(relief)).unwrap();
                 b.sphere([0.0, 1.0, 0.0], 1.0, m, None).unwrap();
-                b.disk([2.0, 0.5, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.2], m, None).unwrap();
+                b.disk([2.0, 0.5, 0.0], [[0.5, 0.0, 0.0], [0.0, 0.5, 0.2]], false, m, None).unwrap();
                 let light = b.material(Material::diffuse([0.0; 3])).unwrap();
                 b.sphere([2.0, 5.0, 2.0], 0.5, light, Some(Emission::front([20.0; 3]))).unwrap();
                 b.environment(Environment::constant([0.2; 3])).unwrap();

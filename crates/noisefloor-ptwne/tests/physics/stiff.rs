@@ -160,7 +160,8 @@ fn far_away_is_as_near() {
             b.sphere(at(to, [-90.0, -68.0, 0.0]), 60.0, metal, None).unwrap();
             b.sphere(at(to, [70.0, -78.0, 60.0]), 50.0, glass, None).unwrap();
             let light = || Some(Emission::front([6.0; 3]));
-            b.disk(at(to, [0.0, 128.0, 0.0]), [90.0, 0.0, 0.0], [0.0, 0.0, 60.0], grey, light()).unwrap();
+            let edges = [[90.0, 0.0, 0.0], [0.0, 0.0, 60.0]];
+            b.disk(at(to, [0.0, 128.0, 0.0]), edges, false, grey, light()).unwrap();
             let corners =
                 [[-60.0, 10.5, -200.0], [60.0, 0.0, -200.0], [0.0, 100.0, -180.0625]].map(|p| at(to, p));
             let mesh = Mesh { positions: &corners, indices: &[[0, 1, 2]], ..Mesh::default() };

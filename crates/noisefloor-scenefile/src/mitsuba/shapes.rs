@@ -76,7 +76,7 @@ impl<'d> Context<'d> {
             ("disk", _) => {
                 let (centre, axes, reversed) = self.disk(element, instance)?;
                 let builder = &mut filling.builder;
-                builder.ringed_disk(centre, axes, reversed, material, emission).map_err(self.refused(element))
+                builder.disk(centre, axes, reversed, material, emission).map_err(self.refused(element))
             }
             ("obj" | "ply" | "serialized" | "rectangle" | "cube" | "sphere" | "cylinder", _) => {
                 let kept = instance.and_then(|_| filling.meshes.get(&element.serial).cloned());
