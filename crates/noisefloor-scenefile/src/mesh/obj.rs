@@ -241,11 +241,14 @@ mod tests {
     }
 
     #[test]
-    fn lines_end_in_any_way_and_text_may_be_wide() {
+    fn lines_end_in_any_way_and_text_may_be_in_any_encoding() {
         let text = format!("# x\n{CORNERS}f 1 2 3\n");
         let wide: Vec<u8> =
             "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
-        for bytes in [text.replace('\n', "\r").into_bytes(), text.replace('\n', "\r\n").into_bytes(), wide] {
+        let latin = [b"g caf\xe9\n".as_slice(), text.as_bytes()].concat();
+        for bytes in
+            [text.replace('\n', "\r").into_bytes(), text.replace('\n', "\r\n").into_bytes(), wide, latin]
+        {
             assert_eq!(parse(&bytes, Path::new("a.obj")).unwrap().indices, [[0, 1, 2]]);
         }
     }
@@ -257,12 +260,6 @@ mod tests {
         assert!(error.contains("a.obj: the OBJ file has no faces"), "{error}");
         let mesh = parse_text(&format!("{CORNERS}mtllib a.mtl\nl 1 2\nl 2 3\nf 1 2 3\nsurf 0 1\n")).unwrap();
         assert_eq!(mesh.unread, ["line 6: `l`", "line 9: `surf`"]);
-    }
-
-    #[test]
-    fn names_may_be_in_any_encoding() {
-        let bytes = [b"g caf\xe9\n".as_slice(), CORNERS.as_bytes(), b"f 1 2 3\n"].concat();
-        assert_eq!(parse(&bytes, Path::new("a.obj")).unwrap().indices, [[0, 1, 2]]);
     }
 
     #[test]

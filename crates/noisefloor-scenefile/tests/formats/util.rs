@@ -113,6 +113,14 @@ pub(crate) fn fails<T>(result: Result<T, impl Display>, want: &str) {
     assert!(error.contains(want), "{error}\nwant: {want}");
 }
 
+/// Asserts that one warning alone has all these parts.
+#[track_caller]
+pub(crate) fn assert_warns(loaded: &Loaded, parts: &[&str]) {
+    let warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    let found = warnings.iter().filter(|w| parts.iter().all(|part| w.contains(part))).count();
+    assert_eq!(found, 1, "warnings about {parts:?} in {warnings:#?}");
+}
+
 /// Compares two colours to a relative tolerance.
 #[track_caller]
 pub(crate) fn close(got: Rgb, want: Rgb, tolerance: f32, what: &str) {

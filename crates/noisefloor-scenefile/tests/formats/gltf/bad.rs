@@ -1,8 +1,9 @@
 //! Bad files: what is said of them names the place, and nothing is allocated for what they only claim to
 //! have.
 
-use super::kit::{Maker, base64, json, load};
-use crate::util::fails;
+use super::kit::{Maker, json, load};
+use crate::util::{assert_warns, fails};
+use base64::prelude::{BASE64_STANDARD, Engine};
 use gltf::json::Value;
 use noisefloor_scenefile::LoadError;
 
@@ -45,7 +46,6 @@ fn the_good_scene_is_good() {
     assert_eq!(loaded.scene.surfaces(), 2);
 }
 
-// Long: a list of cases
 #[test]
 fn every_error_names_its_place() {
     let table = r#"mesh 0 "Table", primitive 0: "#;
@@ -196,7 +196,8 @@ fn nothing_is_allocated_for_what_is_only_claimed() {
     let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x80\0\0\0\x80\0\x08\x02\0\0\0".to_vec();
     png.extend([0x53, 0x0c, 0x3a, 0x71]);
     let mut maker = good();
-    maker.root["images"][0] = json(&format!(r#"{{"uri": "data:image/png;base64,{}"}}"#, base64(&png)));
+    maker.root["images"][0] =
+        json(&format!(r#"{{"uri": "data:image/png;base64,{}"}}"#, BASE64_STANDARD.encode(&png)));
     fails(maker.load(), "image 0");
 
     // Objects of half a kilobyte from three bytes each
@@ -251,7 +252,7 @@ fn what_gltf_allows_is_read() {
     );
     maker.root["scenes"].as_array_mut().unwrap().push(json(r#"{"name": "Empty"}"#));
     let loaded = maker.load().unwrap();
-    super::kit::assert_warns(&loaded, &["animation 0 \"Walk\"", "it is ignored"]);
+    assert_warns(&loaded, &["animation 0 \"Walk\"", "it is ignored"]);
     maker.root["scene"] = 1.into();
     fails(maker.load(), "neither a camera nor a mesh");
 }
@@ -298,9 +299,9 @@ fn unknown_properties_are_warned_of() {
     }
     let loaded = maker.load().unwrap();
     for (_, property, place) in named {
-        super::kit::assert_warns(&loaded, &[&format!("{place}: the property `{property}` is ignored")]);
+        assert_warns(&loaded, &[&format!("{place}: the property `{property}` is ignored")]);
     }
-    super::kit::assert_warns(&loaded, &["material 0 \"Oak\"", "the extension X is ignored"]);
+    assert_warns(&loaded, &["material 0 \"Oak\"", "the extension X is ignored"]);
     assert_eq!(loaded.warnings.len(), named.len() + 1, "{:?}", loaded.warnings);
 }
 

@@ -1,8 +1,8 @@
 //! Extensions, normal maps and colours of vertices, in closed form; and daylight.
 
-use super::kit::{Maker, assert_warns, json, render};
+use super::kit::{Maker, json, render};
 use super::materials::{assert_close, linear, mean, near, wall};
-use crate::util::fails;
+use crate::util::{assert_warns, fails};
 use noisefloor_scenefile::Loaded;
 
 /// A distant light along −z: what a wall of normal n reflects of it is Lambert's cosine.
@@ -22,25 +22,28 @@ fn sunlit(material: &str) -> Maker {
 const CHALK: &str =
     r#""pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {"KHR_materials_ior": {"ior": 1.001}}"#;
 
-const CHALK_ALONE: &str =
-    r#"{"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {"KHR_materials_ior": {"ior": 1.001}}}"#;
+/// What a wall of the normal `n` reflects of that light.
+fn lambert(n: [f32; 3]) -> f32 {
+    let length = n.iter().map(|x| x * x).sum::<f32>().sqrt();
+    3.0 / std::f32::consts::PI * ((n[0] + n[2]) / (2f32.sqrt() * length)).max(0.0)
+}
+
+/// What codes of 8 bits stand for in a normal map.
+fn normal(codes: [u8; 3]) -> [f32; 3] {
+    codes.map(|c| f32::from(c) / 255.0 * 2.0 - 1.0)
+}
 
 #[test]
 fn normal_maps_turn_the_normal() {
-    let lambert = |n: [f32; 3]| {
-        let length = n.iter().map(|x| x * x).sum::<f32>().sqrt();
-        3.0 / std::f32::consts::PI * ((n[0] + n[2]) / (2f32.sqrt() * length)).max(0.0)
-    };
-    // Codes of 8 bits: (204, 128, 230) is (0.6, 0.004, 0.804)
-    let n = [204u8, 128, 230].map(|c| f32::from(c) / 255.0 * 2.0 - 1.0);
+    // (0.6, 0.004, 0.804)
+    let n = normal([204, 128, 230]);
     for (scale, mirrored) in [(1.0, false), (0.5, false), (1.0, true)] {
         let material = format!(r#"{{"normalTexture": {{"index": 0, "scale": {scale}}}, {CHALK}}}"#);
         let mut maker = sunlit(&material);
         maker.texture(1, &[[204, 128, 230, 255]], "{}");
         if mirrored {
             // u runs the other way, and red with it
-            let mirrored = maker.floats(&[[1.0f32, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]);
-            maker.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = mirrored.into();
+            maker.attribute("TEXCOORD_0", &[[1.0f32, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]);
         }
         let side = if mirrored { -1.0 } else { 1.0 };
         let expected = lambert([side * scale * n[0], scale * n[1], n[2]]);
@@ -51,8 +54,7 @@ fn normal_maps_turn_the_normal() {
         let mut maker = sunlit(&format!(r#"{{"normalTexture": {{"index": 0}}, {CHALK}}}"#));
         maker.texture(1, &[[128, 204, 230, 255]], "{}");
         if mirrored {
-            let mirrored = maker.floats(&[[1.0f32, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]);
-            maker.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = mirrored.into();
+            maker.attribute("TEXCOORD_0", &[[1.0f32, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]);
         }
         maker.root["nodes"][3]["rotation"] = json("[-0.38268343, 0, 0, 0.92387953]");
         let expected = lambert([n[0], 0.0, n[2]]);
@@ -78,6 +80,7 @@ fn clear_coats_reflect() {
     fails(broken.load(), "material 0: its clearcoatFactor is no number of 0…1");
 }
 
+/// By texture, factor and colours of vertices.
 #[test]
 fn unlit_surfaces_show_their_colour() {
     let unlit = r#"{"extensions": {"KHR_materials_unlit": {}},
@@ -86,22 +89,14 @@ fn unlit_surfaces_show_their_colour() {
     maker.texture(1, &[[188, 188, 188, 255]], "{}");
     let seen = linear(188);
     assert_close(mean(&maker, 16, 9), [0.5 * seen, seen, 0.25 * seen], 1e-4);
-}
 
-/// Also what shows its colour without light.
-#[test]
-fn colours_of_vertices_multiply_unlit_surfaces() {
-    let unlit = r#"{"extensions": {"KHR_materials_unlit": {}},
-        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 0.25, 1]}}"#;
-    let mut maker = sunlit(unlit);
-    let colours = maker.floats(&[[1.0f32, 0.5, 0.25]; 4]);
-    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours.into();
+    let mut maker = sunlit(&unlit.replace(r#", "baseColorTexture": {"index": 0}"#, ""));
+    maker.attribute("COLOR_0", &[[1.0f32, 0.5, 0.25]; 4]);
     assert_close(mean(&maker, 16, 9), [0.5, 0.5, 0.0625], 1e-4);
     assert_eq!(maker.load().unwrap().warnings, []);
     // From black on the left to white on the right: 1/4 and 3/4 in the mean over each half
     let [black, white] = [[0.0f32; 3], [1.0; 3]];
-    let colours = maker.floats(&[black, white, white, black]);
-    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours.into();
+    maker.attribute("COLOR_0", &[black, white, white, black]);
     let pixels = render(maker.load().unwrap(), 2, 4096, 1);
     for (x, share) in [(0, 0.25), (1, 0.75)] {
         assert_close(pixels[x], [0.5 * share, share, 0.25 * share], 0.01);
@@ -113,11 +108,7 @@ fn colours_of_vertices_multiply_unlit_surfaces() {
 /// not count.
 #[test]
 fn tangents_of_a_mesh_are_the_tangent_space() {
-    let n = [160u8, 90, 245].map(|c| f32::from(c) / 255.0 * 2.0 - 1.0);
-    let lambert = |[x, y, z]: [f32; 3]| {
-        let length = (x * x + y * y + z * z).sqrt();
-        3.0 / std::f32::consts::PI * ((x + z) / (2f32.sqrt() * length)).max(0.0)
-    };
+    let n = normal([160, 90, 245]);
     for (side, mirrored, normals, want) in [
         (1.0f32, false, true, [-n[1], n[0], n[2]]),
         (-1.0, false, true, [n[1], n[0], n[2]]),
@@ -146,8 +137,7 @@ fn colours_of_vertices_multiply() {
     let chalk =
         CHALK.replace(r#"{"metallicFactor""#, r#"{"baseColorFactor": [0.5, 1, 1, 1], "metallicFactor""#);
     let mut maker = sunlit(&format!("{{{chalk}}}"));
-    let colours = maker.floats(&[[1.0f32, 0.5, 0.25]; 4]);
-    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours.into();
+    maker.attribute("COLOR_0", &[[1.0f32, 0.5, 0.25]; 4]);
     let lit = 3.0 / std::f32::consts::PI * 0.5f32.sqrt();
     assert_close(mean(&maker, 64, 9), [0.5 * lit, 0.5 * lit, 0.25 * lit], 3e-3);
 }
@@ -190,7 +180,7 @@ fn what_glows_a_little_does_not_light_the_scene() {
         r#"{"emissiveFactor": [1, 1, 1],
             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 20}}}"#,
     );
-    super::kit::assert_warns(&maker.load().unwrap(), &["its own lights show next to nothing", "a grey sky"]);
+    assert_warns(&maker.load().unwrap(), &["its own lights show next to nothing", "a grey sky"]);
     // In front of it, and turned to it, it is a lamp
     let turned = r#", "rotation": [0, 1, 0, 0], "translation": [0, 0, -1.2]"#;
     maker.root["nodes"].as_array_mut().unwrap().pop();
@@ -269,7 +259,8 @@ fn hidden_nodes_are_not_seen() {
 /// that is there once.
 #[test]
 fn instances_are_seen_where_they_are() {
-    for (material, shining) in [(r#"{"emissiveFactor": [1, 1, 1]}"#, true), (CHALK_ALONE, false)] {
+    let chalk = format!("{{{CHALK}}}");
+    for (material, shining) in [(r#"{"emissiveFactor": [1, 1, 1]}"#, true), (chalk.as_str(), false)] {
         let make = |node: &dyn Fn(&mut Maker, usize)| {
             let mut maker = Maker::new();
             let mesh = maker.rectangle([-0.25, 0.25], [-0.25, 0.25], 0.0, material);

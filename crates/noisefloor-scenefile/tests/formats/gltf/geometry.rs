@@ -1,8 +1,8 @@
 //! Where triangles and cameras are. A lamp is drawn as it is seen directly: its place in the image says where
 //! it is.
 
-use super::kit::{Maker, assert_warns, drawing, json, load};
-use crate::util::fails;
+use super::kit::{Maker, drawing, json, load};
+use crate::util::{assert_warns, fails};
 
 /// Shines to the front.
 const LAMP: &str = r#"{"emissiveFactor": [1, 1, 1]}"#;

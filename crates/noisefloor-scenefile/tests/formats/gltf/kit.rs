@@ -1,5 +1,6 @@
 //! Makes glTF files, and renders them.
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use gltf::json::{Value, deserialize, serialize};
 use noisefloor::Rgb;
 use noisefloor_ptwne::RenderOptions;
@@ -90,6 +91,12 @@ impl Maker {
         self.accessor(5126, shape, elements.len(), &bytes, "")
     }
 
+    /// Gives the first mesh an attribute of these elements.
+    pub(crate) fn attribute<const N: usize>(&mut self, name: &str, elements: &[[f32; N]]) {
+        let accessor = self.floats(elements);
+        self.root["meshes"][0]["primitives"][0]["attributes"][name] = accessor.into();
+    }
+
     pub(crate) fn indices(&mut self, indices: &[u16]) -> usize {
         let bytes: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
         self.accessor(5123, "SCALAR", indices.len(), &bytes, "")
@@ -142,15 +149,17 @@ impl Maker {
         let image = image::RgbaImage::from_raw(width, height, pixels.concat()).unwrap();
         let mut png = Cursor::new(vec![]);
         image.write_to(&mut png, image::ImageFormat::Png).unwrap();
-        let source =
-            self.push("images", &format!(r#"{{"uri": "data:image/png;base64,{}"}}"#, base64(png.get_ref())));
+        let source = self.push(
+            "images",
+            &format!(r#"{{"uri": "data:image/png;base64,{}"}}"#, BASE64_STANDARD.encode(png.get_ref())),
+        );
         let sampler = self.push("samplers", sampler);
         self.push("textures", &format!(r#"{{"source": {source}, "sampler": {sampler}}}"#))
     }
 
     /// The file as JSON with its buffer in a data URI.
     pub(crate) fn gltf(&self) -> Vec<u8> {
-        let uri = format!("data:application/octet-stream;base64,{}", base64(&self.bytes));
+        let uri = format!("data:application/octet-stream;base64,{}", BASE64_STANDARD.encode(&self.bytes));
         serialize::to_vec(&self.with_buffer(Some(&uri))).unwrap()
     }
 
@@ -198,13 +207,6 @@ pub(crate) fn load(name: &str, contents: &[u8]) -> Result<Loaded, LoadError> {
     noisefloor_scenefile::load(&path)
 }
 
-/// Asserts that one warning alone has all these parts.
-pub(crate) fn assert_warns(loaded: &Loaded, parts: &[&str]) {
-    let warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
-    let found = warnings.iter().filter(|w| parts.iter().all(|part| w.contains(part))).count();
-    assert_eq!(found, 1, "warnings about {parts:?} in {warnings:#?}");
-}
-
 /// Means of `samples` samples a pixel of paths of up to `max_depth` segments, row-major from the top left.
 pub(crate) fn render(loaded: Loaded, size: usize, samples: u64, max_depth: u32) -> Vec<Rgb> {
     crate::util::render(
@@ -225,17 +227,4 @@ pub(crate) fn drawing(loaded: Loaded, size: usize) -> String {
         writeln!(drawing).unwrap();
     }
     drawing
-}
-
-pub(crate) fn base64(bytes: &[u8]) -> String {
-    let digits = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::new();
-    for group in bytes.chunks(3) {
-        let word = group.iter().fold(0, |word, b| word << 8 | u32::from(*b)) << (8 * (3 - group.len()));
-        for i in 0..4 {
-            let digit = digits[(word >> (18 - 6 * i) & 63) as usize];
-            text.push(if i <= group.len() { digit as char } else { '=' });
-        }
-    }
-    text
 }

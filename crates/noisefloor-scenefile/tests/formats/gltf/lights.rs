@@ -1,6 +1,7 @@
 //! Lights without size, over a floor that is almost Lambertian.
 
-use super::kit::{Maker, assert_warns, render};
+use super::kit::{Maker, render};
+use crate::util::assert_warns;
 use std::f32::consts::PI;
 
 pub(crate) const ALBEDO: f32 = 0.6;

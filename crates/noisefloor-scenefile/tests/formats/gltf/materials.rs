@@ -1,6 +1,7 @@
 //! What surfaces look like: radiance in closed form.
 
-use super::kit::{Maker, assert_warns, json, render};
+use super::kit::{Maker, json, render};
+use crate::util::assert_warns;
 use noisefloor::Rgb;
 
 const NEAREST: &str = r#"{"magFilter": 9728}"#;
@@ -160,8 +161,7 @@ fn textures_are_interpolated_unless_nearest() {
 fn the_set_of_texture_coordinates_is_the_materials() {
     // Set 1 is upside down
     let second = |maker: &mut Maker| {
-        let uvs = maker.floats(&[[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
-        maker.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = uvs.into();
+        maker.attribute("TEXCOORD_1", &[[0.0f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     };
     let drawn = four(2, NEAREST, |maker| {
         second(maker);

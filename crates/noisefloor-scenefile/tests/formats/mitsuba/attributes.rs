@@ -1,4 +1,4 @@
-use crate::util::{Folder, SKY, bsdf, close, fails, rgb, value};
+use crate::util::{Folder, SKY, assert_warns, bsdf, close, fails, rgb, value};
 
 /// Two triangles side by side with a colour at their corners, and a weight on each.
 fn folder() -> Folder {
@@ -56,8 +56,8 @@ fn meshes_have_the_colours_of_their_attributes() {
 #[test]
 fn attributes_out_of_place_are_named() {
     let folder = folder();
-    let outside = folder.body(&mesh(&attribute("face_weight", ""))).unwrap().warnings;
-    assert!(outside[0].to_string().contains("3 values of `face_weight` are outside 0…1"), "{outside:?}");
+    let outside = folder.body(&mesh(&attribute("face_weight", ""))).unwrap();
+    assert_warns(&outside, &["3 values of `face_weight` are outside 0…1"]);
     let (grey, weight) = (bsdf("diffuse", ""), texture("weight", "face_weight", ""));
     let two = bsdf("blendbsdf", &(weight + &grey + &attribute("vertex_color", "")));
     let masked = bsdf("mask", &(texture("opacity", "face_weight", "") + &grey));

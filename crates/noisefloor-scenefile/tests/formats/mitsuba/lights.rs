@@ -1,4 +1,4 @@
-use crate::util::{Folder, SKY, close, nearest, of, rgb, seen, to_world};
+use crate::util::{Folder, SKY, assert_warns, close, nearest, of, rgb, seen, to_world};
 use std::f32::consts::FRAC_1_PI;
 
 const FLOOR: &str = r#"<shape type="rectangle"><transform name="to_world"><scale value="100"/></transform>
@@ -195,7 +195,7 @@ fn spots_in_shapes_shine() {
     let want = [8.0, 4.0, 2.0].map(|i| 0.5 / std::f32::consts::PI * i / 4.0);
     close(folder.see(&inside), want, 1e-3, &inside);
     let beam = format!(r#"{floor}<emitter type="collimated"/>"#);
-    assert!(folder.body(&beam).unwrap().warnings[0].what.contains("the beam is ignored"));
+    assert_warns(&folder.body(&beam).unwrap(), &["the beam is ignored"]);
 }
 
 /// A Radiance picture begins with `#?` and any word (Ward 1991). Codes 128 with an exponent of 129 are

@@ -1,4 +1,6 @@
-use crate::util::{Folder, SKY, bsdf, close, fails, float, nearest, of, ply, rgb, shape_at, value};
+use crate::util::{
+    Folder, SKY, assert_warns, bsdf, close, fails, float, nearest, of, ply, rgb, shape_at, value,
+};
 
 /// A 2 × 2 picture: red, green; grey, white; all transparent but one.
 pub(crate) fn folder() -> Folder {
@@ -121,16 +123,11 @@ fn bright_pictures_shine_and_factors_are_clamped() {
         r#"<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" {bright}</texture>
             </bsdf></shape>{SKY}"#
     );
-    let loaded = folder.body(&body).unwrap();
-    assert!(
-        loaded.warnings[0].to_string().contains("line 2: 3 values of the picture are outside 0…1"),
-        "{:?}",
-        loaded.warnings
-    );
+    let outside = "line 2: 3 values of the picture are outside 0…1";
+    assert_warns(&folder.body(&body).unwrap(), &[outside]);
     let body = r#"<shape type="rectangle"><bsdf type="conductor">
         <rgb name="specular_reflectance" value="1.5, 1, 0.5"/></bsdf></shape>"#;
-    let loaded = folder.body(body).unwrap();
-    assert!(loaded.warnings[0].to_string().contains("values above 1 become 1"));
+    assert_warns(&folder.body(body).unwrap(), &["values above 1 become 1"]);
     close(folder.see(&format!("{body}{SKY}")), [1.0, 1.0, 0.5], 1e-4, body);
 }
 
@@ -150,7 +147,6 @@ fn in_the_sky(folder: &Folder, bsdf: &str) -> [[f32; 3]; 2] {
     })
 }
 
-// Long: a list of cases
 #[test]
 fn surfaces_reflect_a_white_sky_as_they_should() {
     let folder = folder();
@@ -294,9 +290,7 @@ fn near_surfaces_are_warned_of() {
         ),
         (bsdf("conductor", &(rgb("eta", "-0.01 1 1") + &rgb("k", 3))), "brought into 0…100"),
     ] {
-        let loaded = folder.body(&format!("<shape type=\"cube\">{bsdf}</shape>")).unwrap();
-        let warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
-        assert!(warnings.iter().any(|w| w.contains(what)), "{bsdf}: {warnings:?}");
+        assert_warns(&folder.body(&of("shape", "cube", &bsdf)).unwrap(), &[what]);
     }
     // Exact ones do not
     let null = format!(r#"<shape type="rectangle"><bsdf type="null"/></shape>{SKY}"#);

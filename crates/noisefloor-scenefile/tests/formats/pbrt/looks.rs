@@ -1,4 +1,4 @@
-use crate::util::{Folder, PINHOLE, close, fails, look, ply, render, seen};
+use crate::util::{Folder, PINHOLE, assert_warns, close, fails, look, ply, render, seen};
 use noisefloor_ptwne::{FovAxis, RenderOptions};
 use noisefloor_scenefile::LoadOptions;
 use std::f32::consts::PI;
@@ -6,6 +6,9 @@ use std::f32::consts::PI;
 /// A square from −1 to 1 whose front is +z.
 const SQUARE: &str =
     "Shape 'trianglemesh' 'integer indices' [0 1 2 0 2 3] 'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0]\n";
+/// The same with texture coordinates from 0 to 1.
+const MAPPED: &str = "Shape 'trianglemesh' 'integer indices' [0 1 2 0 2 3] \
+    'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0] 'point2 uv' [0 0 1 0 1 1 0 1]\n";
 const LIGHT: &str = "AreaLightSource 'diffuse' 'rgb L' [1 2 3]\n";
 const SKY: &str = "LightSource 'infinite' 'rgb L' [1 1 1]\n";
 
@@ -55,9 +58,7 @@ fn relief_and_subdivision_shape_what_is_lit() {
     let exr = |pixels: &[[f32; 3]]| Folder::new().with_exr("a.exr", pixels.len(), pixels);
     // From +x +z onto the square, whose u runs along +x over 2 units
     let sun = "LightSource 'distant' 'rgb L' [3 3 3] 'point3 from' [1 0 1] 'point3 to' [0 0 0]\n";
-    let square = SQUARE.replace("'point3 P'", "'point2 uv' [0 0 1 0 1 1 0 1] 'point3 P'");
-    let lambert =
-        |[x, z]: [f32; 2]| [0.5 / std::f32::consts::PI * 3.0 * (x + z) / (2.0 * (x * x + z * z)).sqrt(); 3];
+    let lambert = |[x, z]: [f32; 2]| [0.5 / PI * 3.0 * (x + z) / (2.0 * (x * x + z * z)).sqrt(); 3];
     // A picture of two pixels rises by 1 between their middles, 1 unit apart; times −0.1·4
     let ramp = exr(&[[0.0; 3], [1.0; 3]]);
     let texture = "Texture 't' 'float' 'imagemap' 'string filename' 'a.exr' 'float scale' 4\n\
@@ -65,12 +66,12 @@ fn relief_and_subdivision_shape_what_is_lit() {
     for material in
         ["Material 'diffuse' 'texture displacement' 's'\n", "Material 'matte' 'texture bumpmap' 's'\n"]
     {
-        let world = format!("{sun}{texture}{material}{square}");
+        let world = format!("{sun}{texture}{material}{MAPPED}");
         close(ramp.see(&world), lambert([0.4, 1.0]), 5e-3, material);
     }
     let turned = exr(&[[0.8, 0.5, 0.9]]);
     let material = "Material 'diffuse' 'string normalmap' 'a.exr'\n";
-    close(turned.see(&format!("{sun}{material}{square}")), lambert([0.6, 0.8]), 5e-3, material);
+    close(turned.see(&format!("{sun}{material}{MAPPED}")), lambert([0.6, 0.8]), 5e-3, material);
 
     // A flat square of four: subdivided, its middle stays where it is. Levels beyond memory are refused
     let grid = "Shape 'loopsubdiv' 'integer indices' [0 1 4 0 4 3 1 2 5 1 5 4 3 4 7 3 7 6 4 5 8 4 8 7] \
@@ -171,7 +172,6 @@ fn coloured_opacity_is_warned_of() {
 fn lights_have_the_units_of_pbrt() {
     let folder = Folder::new();
     let floor = format!("Material 'diffuse' 'rgb reflectance' [0.8 0.8 0.8] Scale 100 100 1 {SQUARE}");
-    let per_irradiance = 0.8 / std::f32::consts::PI;
     for (light, irradiance) in [
         ("LightSource 'point' 'rgb I' [4 8 0] 'point3 from' [0 0 2]", [1.0, 2.0, 0.0]),
         ("LightSource 'point' 'rgb I' [1 1 1] 'float scale' 4 'point3 from' [0 0 2]", [1.0; 3]),
@@ -180,7 +180,7 @@ fn lights_have_the_units_of_pbrt() {
         // Halfway between 25° and 30° by the cosine, 27.6046°
         ("LightSource 'spot' 'rgb I' [4 4 4] 'point3 from' [0 0 2] 'point3 to' [1.045778 0 0]", [0.5; 3]),
     ] {
-        let want = irradiance.map(|e| e * per_irradiance);
+        let want = irradiance.map(|e| e * 0.8 / PI);
         close(folder.see(&format!("{light}\n{floor}")), want, 1e-3, light);
     }
     // A black body has a luminance of 1 in pbrt 4
@@ -230,7 +230,7 @@ fn instances_share_their_object() {
         format!("{object}AttributeBegin Scale 1 0 1 ObjectInstance 'o' AttributeEnd ObjectInstance 'o'");
     let loaded = folder.world(&flat).unwrap();
     assert_eq!(loaded.scene.instances(), 1);
-    assert!(loaded.warnings.iter().any(|w| w.what == "an instance is left out: its transform is singular"));
+    assert_warns(&loaded, &["an instance is left out: its transform is singular"]);
 }
 
 /// Files that the scene names: includes, gzipped meshes.
@@ -313,15 +313,13 @@ fn roughness_may_be_a_picture() {
     let folder = Folder::new().with_png("r.png", 2, &[[26, 26, 26, 255], [204, 204, 204, 255]]);
     let map = "Texture 'r' 'float' 'imagemap' 'string filename' 'r.png' 'string filter' 'point'
         'string encoding' 'linear'";
-    let quad = "Shape 'trianglemesh' 'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
-        'point2 uv' [0 0 1 0 1 1 0 1] 'integer indices' [0 1 2 0 2 3]";
     let sun = "LightSource 'distant' 'point3 from' [0 0.4 1] 'point3 to' [0 0 0] 'rgb L' [1 1 1]";
     for kind in [
         "'conductor' 'rgb reflectance' [1 1 1] 'bool remaproughness' false",
         "'disney' 'rgb color' [1 1 1] 'float metallic' 1",
     ] {
         let at = |x: f32, roughness: &str| {
-            folder.see(&format!("{map}\n{sun}\nTranslate {x} 0 0 Material {kind} {roughness} {quad}"))[0]
+            folder.see(&format!("{map}\n{sun}\nTranslate {x} 0 0 Material {kind} {roughness} {MAPPED}"))[0]
         };
         for (x, value) in [(0.5, 26.0 / 255.0), (-0.5, 204.0 / 255.0)] {
             let plain = at(x, &format!("'float roughness' {value}"));
@@ -376,7 +374,7 @@ fn spectra_of_lights_are_those_of_their_version() {
         let area = format!("AreaLightSource 'diffuse' {light}\n{SQUARE}WorldEnd");
         close(folder.see(&area), want, 1e-3, light);
         let distant = format!("LightSource 'distant' {light} 'point from' [0 0 1] 'point to' [0 0 0]");
-        let reflected = want.map(|c| c * 0.5 / std::f32::consts::PI);
+        let reflected = want.map(|c| c * 0.5 / PI);
         close(folder.see(&format!("{distant}\n{SQUARE}WorldEnd")), reflected, 2e-3, light);
         let point = distant.replace("distant", "point").replace("L'", "I'");
         close(folder.see(&format!("{point}\n{SQUARE}WorldEnd")), reflected, 2e-3, light);
@@ -425,24 +423,21 @@ fn illuminants_have_their_colours() {
         assert_eq!(said.len(), usize::from(name == "stdillum-D50"), "{said:?}");
     }
     // Names that pbrt does not know, and what cannot be what it is said to be
-    for (name, want) in [
-        ("stdillum-G", "there is no spectrum `stdillum-G`: it is none of pbrt's names"),
-        ("illum-A", "there is no spectrum `illum-A`"),
-        ("stdillum-acesD60", "there is no spectrum `stdillum-acesD60`"),
-        ("metal-Ag-eta", "`metal-Ag-eta` as a light is not supported"),
-        ("glass-BK7", "`glass-BK7` as a light is not supported"),
-        ("nikon_d850_g", "`nikon_d850_g` as a spectrum: it is what a camera's sensor responds to"),
+    let light = "LightSource 'infinite' 'spectrum L'";
+    let factor = "Material 'diffuse' 'spectrum reflectance'";
+    for (parameter, name, want) in [
+        (light, "stdillum-G", "there is no spectrum `stdillum-G`: it is none of pbrt's names"),
+        (light, "illum-A", "there is no spectrum `illum-A`"),
+        (light, "stdillum-acesD60", "there is no spectrum `stdillum-acesD60`"),
+        (light, "metal-Ag-eta", "`metal-Ag-eta` as a light is not supported"),
+        (light, "glass-BK7", "`glass-BK7` as a light is not supported"),
+        (light, "nikon_d850_g", "`nikon_d850_g` as a spectrum: it is what a camera's sensor responds to"),
+        (factor, "stdillum-A", "`stdillum-A` as a factor is not supported"),
+        (factor, "glass-SF10", "there is no spectrum `glass-SF10`"),
+        (factor, "metal-Hg-eta", "there is no spectrum `metal-Hg-eta`"),
+        (factor, "metal-Cu-n", "there is no spectrum `metal-Cu-n`"),
     ] {
-        fails(folder.world(&format!("LightSource 'infinite' 'spectrum L' '{name}'")), want);
-    }
-    for (name, want) in [
-        ("stdillum-A", "`stdillum-A` as a factor is not supported"),
-        ("glass-SF10", "there is no spectrum `glass-SF10`"),
-        ("metal-Hg-eta", "there is no spectrum `metal-Hg-eta`"),
-        ("metal-Cu-n", "there is no spectrum `metal-Cu-n`"),
-    ] {
-        let world = format!("Material 'diffuse' 'spectrum reflectance' '{name}' Shape 'sphere'");
-        fails(folder.world(&world), want);
+        fails(folder.world(&format!("{parameter} '{name}' Shape 'sphere'")), want);
     }
 }
 
@@ -535,35 +530,22 @@ const GREY: &str = "Material 'diffuse' 'rgb reflectance' [.5 .5 .5]\n";
 fn lights_have_the_power_that_is_asked_for() {
     let folder = Folder::new();
     let diffuse = |irradiance: f32| 0.5 / PI * irradiance;
-    let cone = 2.0
-        * PI
-        * ((1.0 - 25f32.to_radians().cos()) + (25f32.to_radians().cos() - 30f32.to_radians().cos()) / 2.0);
-    for (light, want) in [
-        (
-            "LightSource 'distant' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float illuminance' 2",
-            diffuse(2.0),
-        ),
-        (
-            "LightSource 'distant' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float illuminance' 2 'float scale' 3",
-            diffuse(6.0),
-        ),
-        (
-            "LightSource 'distant' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float illuminance' -1",
-            diffuse(1.0),
-        ),
-        ("LightSource 'point' 'point3 from' [0 0 1] 'float power' 100", diffuse(100.0 / (4.0 * PI))),
-        (
-            "LightSource 'spot' 'point3 from' [0 0 1] 'point3 to' [0 0 0] 'float power' 100",
-            diffuse(100.0 / cone),
-        ),
-        ("LightSource 'infinite' 'float illuminance' 3", 0.5 / PI * 3.0),
+    let [inner, outer] = [25f32, 30.0].map(|angle| angle.to_radians().cos());
+    let cone = 2.0 * PI * ((1.0 - inner) + (inner - outer) / 2.0);
+    for (light, end, want) in [
+        ("'distant' 'float illuminance' 2", "", diffuse(2.0)),
+        ("'distant' 'float illuminance' 2 'float scale' 3", "", diffuse(6.0)),
+        ("'distant' 'float illuminance' -1", "", diffuse(1.0)),
+        ("'point' 'float power' 100", "", diffuse(100.0 / (4.0 * PI))),
+        ("'spot' 'float power' 100", "", diffuse(100.0 / cone)),
+        ("'infinite' 'float illuminance' 3", "", diffuse(3.0)),
+        // Version 3 knows neither
+        ("'point' 'float power' 100", "WorldEnd", diffuse(1.0)),
     ] {
-        let got = folder.see(&format!("{light}\n{GREY}{SQUARE}"));
+        let above = "'point3 from' [0 0 1] 'point3 to' [0 0 0]";
+        let got = folder.see(&format!("LightSource {light} {above}\n{GREY}{SQUARE}{end}"));
         close(got, [want; 3], 0.02, light);
     }
-    // Version 3 knows neither
-    let old = "LightSource 'point' 'point3 from' [0 0 1] 'float power' 100\n";
-    close(folder.see(&format!("{old}{GREY}{SQUARE}WorldEnd")), [diffuse(1.0); 3], 0.02, "version 3");
 
     // Shapes that shine: π times area times radiance
     let patch = "Shape 'bilinearmesh' 'point3 P' [-1 -1 0 1 -1 0 -1 1 0 1 1 0]";
@@ -590,11 +572,8 @@ fn area_lights_show_pictures() {
     let red = ((188.0f32 / 255.0 + 0.055) / 1.055).powf(2.4);
     // The camera looks at the middle: the upper half of the picture above it, and the lower below
     let at = |y: f32, more: &str| {
-        let quad = format!(
-            "Translate 0 {y} 0 Shape 'trianglemesh' 'point3 P' [-1 -1 0 1 -1 0 1 1 0 -1 1 0]
-            'point2 uv' [0 0 1 0 1 1 0 1] 'integer indices' [0 1 2 0 2 3]"
-        );
-        folder.see(&format!("AreaLightSource 'diffuse' 'string filename' 'a.png' {more}\n{quad}"))
+        let light = format!("AreaLightSource 'diffuse' 'string filename' 'a.png' {more}\n");
+        folder.see(&format!("{light}Translate 0 {y} 0 {MAPPED}"))
     };
     close(at(-0.5, ""), [1.0; 3], 1e-3, "top");
     close(at(0.5, ""), [red, 0.0, 0.0], 1e-3, "bottom");
