@@ -2,8 +2,8 @@
 //!
 //! `denoised_corpus levels FOLDER SCENE WIDTHxHEIGHT SEED MOST`: renders a scene with the built-in path tracer, as `render --denoise
 //! oidn` does, and writes it at many numbers of samples, up to MOST: both halves, what Open Image Denoise makes of each half and of all
-//! samples with clean first hits, and the mean of four mirror images. All files hold linear radiance, `f32`, little-endian, row-major.
-//! Halves that are there already, from another renderer for instance, are taken as they are. `samples.csv` says that all is there.
+//! samples with clean first hits, as the mean of four mirror images. All files hold linear radiance, `f32`, little-endian, row-major.
+//! `samples.csv` says that all is there.
 //! After 256 samples, a tile goes on only to four times what it, or one beside it, is estimated to need for 0.2 JOD. Also how
 //! many samples each tile has, what they took, and what a tile that lacks light would lose by it.
 //!
@@ -180,68 +180,56 @@ fn levels(folder: &Path, scene: &Opened, seed: u64, most: u64) -> Outcome<()> {
     keep(folder.join("normal.f32"), &both.normal)?;
 
     let mut film = Film::new(grid);
-    let (mut seconds, mut denoising) = (vec![0.0; grid.len()], 0.0);
+    let mut seconds = vec![0.0; grid.len()];
     // Samples after which each tile had lost little
     let mut needs = vec![u64::MAX; grid.len()];
     let mut counts = String::from("level,tile,spp,seconds,unmet\n");
     for level in LEVELS.into_iter().take_while(|&level| level <= most) {
-        let kept = ["a", "b"].map(|name| folder.join(format!("{name}-{level:05}.f32")));
-        let rendered = !kept.iter().all(|path| path.exists());
-        let [a, b] = if rendered {
-            let wanted: Vec<(usize, u64)> = grid
-                .tiles()
-                .filter(|tile| level <= FOR_ALL || level <= beside(grid, &needs, *tile).saturating_mul(MORE))
-                .map(|tile| (tile.index, level))
-                .collect();
-            if wanted.is_empty() {
-                break;
-            }
-            sample(&mut source, &mut film, &wanted, &mut seconds)?;
-            halves(&film)
-        } else {
-            [load(&kept[0])?, load(&kept[1])?]
-        };
+        let wanted: Vec<(usize, u64)> = grid
+            .tiles()
+            .filter(|tile| level <= FOR_ALL || level <= beside(grid, &needs, *tile).saturating_mul(MORE))
+            .map(|tile| (tile.index, level))
+            .collect();
+        if wanted.is_empty() {
+            break;
+        }
+        sample(&mut source, &mut film, &wanted, &mut seconds)?;
+        let [a, b] = halves(&film);
         let all = mean(&a, &b);
         let [pa, pb, pall] = [(&a, &ga), (&b, &gb), (&all, &both)]
             .map(|(noisy, guide)| NoisyPicture::new(size, noisy).guided(guide, clean, wants));
-        let began = std::time::Instant::now();
         let [da, db] = oidn.denoise_both([&pa, &pb])?;
-        denoising += began.elapsed().as_secs_f64();
-        let (once, shown) = (oidn.denoise(&pall)?, four.denoise(&pall)?);
-        for (name, picture) in
-            [("a", &a), ("b", &b), ("da", &da), ("db", &db), ("once", &once), ("shown", &shown)]
-        {
+        let shown = four.denoise(&pall)?;
+        for (name, picture) in [("a", &a), ("b", &b), ("da", &da), ("db", &db), ("shown", &shown)] {
             keep(folder.join(format!("{name}-{level:05}.f32")), picture)?;
         }
-        if rendered {
-            let display = ToneMapping::default().settle(&all);
-            let eyes = &mut Eyes::default();
-            let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
-            let error = DenoisedError::new(&halves, &display)?;
-            let unmet = Unmet::of(&film, &display, Viewing::default());
-            for tile in grid.tiles() {
-                let [own, square] = [tile, around(tile, size)].map(|part| eyes.lost(&error, part));
-                if own?.min(square?) <= LITTLE {
-                    needs[tile.index] = needs[tile.index].min(level);
-                }
-                let dark = match unmet.shown(&film, &display, tile) {
-                    Some(light) => {
-                        let field = display.luma(average(tile.rows(size.0).flatten().map(|p| all[p])));
-                        let light: Vec<f32> = light.residual.inside(light.inner).collect();
-                        eyes.seen(&vec![field; light.len()], &light, (tile.width, tile.height))?
-                    }
-                    None => 0.0,
-                };
-                let (tile, spp) = (tile.index, film.spp(tile.index));
-                writeln!(counts, "{level},{tile},{spp},{:.4},{dark:.4}", seconds[tile])?;
+        let display = ToneMapping::default().settle(&all);
+        let eyes = &mut Eyes::default();
+        let halves = DenoisedHalves { size, noisy: [&a, &b], denoised: [&da, &db] };
+        let error = DenoisedError::new(&halves, &display)?;
+        let unmet = Unmet::of(&film, &display, Viewing::default());
+        for tile in grid.tiles() {
+            let [own, square] = [tile, around(tile, size)].map(|part| eyes.lost(&error, part));
+            if own?.min(square?) <= LITTLE {
+                needs[tile.index] = needs[tile.index].min(level);
             }
-            std::fs::write(folder.join("counts.csv"), &counts)?;
+            let dark = match unmet.shown(&film, &display, tile) {
+                Some(light) => {
+                    let field = display.luma(average(tile.rows(size.0).flatten().map(|p| all[p])));
+                    let light: Vec<f32> = light.residual.inside(light.inner).collect();
+                    eyes.seen(&vec![field; light.len()], &light, (tile.width, tile.height))?
+                }
+                None => 0.0,
+            };
+            let (tile, spp) = (tile.index, film.spp(tile.index));
+            writeln!(counts, "{level},{tile},{spp},{:.4},{dark:.4}", seconds[tile])?;
         }
+        std::fs::write(folder.join("counts.csv"), &counts)?;
     }
     let (width, height) = size;
     Ok(std::fs::write(
         folder.join("samples.csv"),
-        format!("width,height,clean,denoising\n{width},{height},{clean},{denoising:.3}\n"),
+        format!("width,height,clean\n{width},{height},{clean}\n"),
     )?)
 }
 
@@ -375,41 +363,19 @@ fn estimate(folder: &Path) -> Outcome<()> {
             &DenoisedError::known(size, &shown, &clean, &display)?,
             eyes,
         )?;
-        print(
-            &mut out,
-            level,
-            "once",
-            &DenoisedError::known(size, &picture("once")?, &truth, &display)?,
-            eyes,
-        )?;
         print(&mut out, level, "noisy", &DenoisedError::known(size, &all, &truth, &display)?, eyes)?;
         print(&mut out, level, "noisy-denoised", &DenoisedError::known(size, &all, &clean, &display)?, eyes)?;
         // The noise as a verdict knows it: half the difference of the halves, on what the denoiser made
-        let (film, mut lost_by_noise) = (kept.film([&a, &b], spp)?, Vec::new());
-        let (mut noise, mut on) = (vec![0.0; all.len()], error.shown().to_vec());
+        let film = kept.film([&a, &b], spp)?;
         for tile in grid.tiles() {
             let planes = TilePlanes::from_halves(&film, &display, tile);
             let values: Vec<f32> = planes.residual.inside(planes.inner).collect();
-            let made: Vec<f32> = tile.rows(size.0).flatten().map(|pixel| on[pixel]).collect();
+            let made: Vec<f32> = tile.rows(size.0).flatten().map(|pixel| error.shown()[pixel]).collect();
             let rendered: Vec<f32> = planes.image.inside(planes.inner).collect();
             let [made, rendered] =
                 [made, rendered].map(|on| eyes.seen(&on, &values, (tile.width, tile.height)));
-            lost_by_noise.push((tile.index, made?.max(rendered?)));
-            for (pixel, value) in tile.rows(size.0).flatten().zip(values) {
-                noise[pixel] = value;
-            }
-        }
-        for (tile, lost) in lost_by_noise {
-            writeln!(out, "{scene},{level},{tile},noise,{lost:.5},{lost:.5}")?;
-        }
-        let name = |kind: &str| folder.join(format!("{kind}-{level:05}.luma"));
-        for (kind, plane) in
-            [("noise", &mut noise), ("on", &mut on), ("error", &mut error.residual().to_vec())]
-        {
-            std::fs::write(
-                name(kind),
-                plane.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>(),
-            )?;
+            let lost = made?.max(rendered?);
+            writeln!(out, "{scene},{level},{},noise,{lost:.5},{lost:.5}", tile.index)?;
         }
     }
     Ok(std::io::stdout().write_all(out.as_bytes())?)

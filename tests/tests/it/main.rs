@@ -10,7 +10,6 @@ mod halves; // halves are equals
 mod kit; // sources made by hand
 mod mitsuba; // Mitsuba, where it is installed
 mod msrv; // the oldest Rust that is promised
-mod no_linfa; // judging alone needs no machinery of training
 mod numerics; // extreme radiance, odd sizes, uneven halves
 mod outside; // contracts of the core, by its public interface alone
 mod people; // what people said of real renders

@@ -1,6 +1,7 @@
-use crate::kit::{FILES, command, grey_exr, json, run, stderr, succeed, text};
+use crate::kit::{FILES, column, command, grey_exr, json, run, stderr, succeed, text, wait_for};
 use noisefloor::Checkpoint;
 use noisefloor_image::{read_exr, read_picture};
+use noisefloor_testkit::Noise;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
@@ -42,17 +43,25 @@ fn kill_and_resume(kills: usize) {
     let whole = tempdir().unwrap();
     succeed(&arguments(text(whole.path()), &[]));
     let pixels = |out: &Path| read_exr(out.join("image.exr")).unwrap().pixels;
-    let right = pixels(whole.path());
-    let mut random = fastrand::Rng::with_seed(kills as u64);
-    let (mut killed, mut finished, mut most_left) = (0, 0, 0);
+    let stops = |out: &Path| std::fs::read(out.join("stops.csv")).unwrap();
+    let mut random = Noise::new(kills as u64);
+    let (mut killed, mut finished, mut most_left, mut went_on) = (0, 0, 0, false);
     while killed < kills || finished == 0 {
         let folder = tempdir().unwrap();
         let out = folder.path();
+        // Written last
+        let is_saved = || out.join("report.json").exists();
         loop {
+            let goes_on = is_saved();
             let mut child =
                 command(&arguments(text(out), &["--resume"])).stderr(Stdio::null()).spawn().unwrap();
+            // The last one to be killed leaves something to go on with
+            if killed + 1 == kills {
+                let mut is_due = || is_saved() || child.try_wait().unwrap().is_some();
+                wait_for("the first save", || is_due().then_some(()));
+            }
             let ended = if killed < kills {
-                std::thread::sleep(Duration::from_millis(random.u64(0..700)));
+                std::thread::sleep(Duration::from_millis(random.below(700) as u64));
                 child.try_wait().unwrap()
             } else {
                 Some(child.wait().unwrap())
@@ -60,8 +69,16 @@ fn kill_and_resume(kills: usize) {
             if let Some(status) = ended {
                 assert!(status.success(), "{status}");
                 finished += 1;
-                assert!(pixels(out) == right, "after {killed} kills the picture is another one");
-                assert_eq!(temporary_files(out), 0);
+                assert!(pixels(out) == pixels(whole.path()), "after {killed} kills it is another picture");
+                assert_eq!(stops(out), stops(whole.path()));
+                let report = json(&out.join("report.json"));
+                assert_eq!(report["complete"], true);
+                assert!(!goes_on || report["seconds_before"].as_f64() > Some(0.0), "{report}");
+                let samples: Vec<u64> =
+                    column(&out.join("timeline.csv"), "samples").iter().map(|n| n.parse().unwrap()).collect();
+                assert!(samples.is_sorted() && samples.last().copied() == report["samples"].as_u64());
+                assert_eq!((temporary_files(out), out.join("checkpoint.nfc").exists()), (0, false));
+                went_on |= goes_on;
                 break;
             }
             child.kill().unwrap();
@@ -71,6 +88,7 @@ fn kill_and_resume(kills: usize) {
             assert_each_whole(out);
         }
     }
+    assert!(went_on, "none had anything to go on with");
     assert!(most_left <= 1, "temporary files pile up: {most_left}");
     println!(
         "{killed} kills, {finished} renders finished, at most {most_left} temporary file left by a kill"

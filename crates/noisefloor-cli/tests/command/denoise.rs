@@ -1,13 +1,12 @@
 use crate::kit::{
-    FILES, column, command, fail, json, random, run, stderr, succeed, text, tiny, wait_for, words,
+    FILES, column, command, fail, json, run, stderr, succeed, text, tiny, wait_for, words,
 };
 use noisefloor_denoise::OIDN;
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::find;
-use noisefloor_testkit::{HANG, Requirement, require, require_python};
+use noisefloor_testkit::{HANG, Noise, Requirement, require, require_python};
 use std::path::Path;
 use std::process::Stdio;
-use std::time::Duration;
 use tempfile::tempdir;
 
 #[test]
@@ -73,45 +72,6 @@ fn the_denoised_picture_and_its_error_are_written() {
     assert!(String::from_utf8(said.stdout).unwrap().lines().any(|line| line.starts_with("oidn ")));
 }
 
-/// Killed at random moments and resumed, a render ends as an undisturbed one does, and knows what was found of
-/// tiles that had stopped before.
-#[test]
-fn killed_denoised_renders_lose_nothing() {
-    if require(Requirement::Renderers, find(&OIDN)).is_none() {
-        return;
-    }
-    let [whole, killed] = [tempdir().unwrap(), tempdir().unwrap()];
-    let arguments = |out: &Path, more: &[&str]| -> Vec<String> {
-        let args = ["render", "--size", "64x64", "--tile", "32", "--denoise", "oidn", "--lost", "0.02"];
-        let rest = ["--max-spp", "700", "--threads", "1", "--quiet", "--autosave", "0.1", "--out", text(out)];
-        args.iter().chain(&rest).chain(more).map(|word| (*word).to_owned()).collect()
-    };
-    succeed(&arguments(whole.path(), &[]));
-    let resume = arguments(killed.path(), &["--resume"]);
-    let saved = killed.path().join("checkpoint.nfc");
-    let last_save = || std::fs::metadata(&saved).and_then(|file| file.modified()).ok();
-    let mut cut = 0;
-    for wait in [0, 150, 400] {
-        let before = last_save();
-        let mut child = command(&resume).stderr(Stdio::null()).spawn().unwrap();
-        while last_save() == before && child.try_wait().unwrap().is_none() {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        std::thread::sleep(Duration::from_millis(wait));
-        cut += usize::from(child.try_wait().unwrap().is_none());
-        child.kill().unwrap();
-        child.wait().unwrap();
-    }
-    assert!(cut > 0, "the render was done before it was killed, each time");
-    succeed(&resume);
-    assert_same_pictures(killed.path(), whole.path());
-    let report = |out: &Path| json(&out.join("report.json"))["denoised"].clone();
-    let (right, found) = (report(whole.path()), report(killed.path()));
-    for key in ["jods_lost", "spp_without", "guided"] {
-        assert_eq!(found[key], right[key], "{key}");
-    }
-}
-
 #[test]
 fn denoised_pictures_made_elsewhere() {
     let folder = tempdir().unwrap();
@@ -119,10 +79,14 @@ fn denoised_pictures_made_elsewhere() {
     let stripes = |noise: &mut dyn FnMut() -> f64| -> Vec<[f32; 3]> {
         (0..64 * 64).map(|i| [0.4 + 0.05 * (i / 4 % 2) as f32 + 0.01 * noise() as f32; 3]).collect()
     };
+    let noise = |seed: u64| {
+        let mut noise = Noise::new(seed);
+        move || noise.normal()
+    };
     let flat = vec![[0.425; 3]; 64 * 64];
     for (name, pixels) in [
-        ("a.exr", stripes(&mut random(1))),
-        ("b.exr", stripes(&mut random(2))),
+        ("a.exr", stripes(&mut noise(1))),
+        ("b.exr", stripes(&mut noise(2))),
         ("good.exr", stripes(&mut || 0.0)),
         ("good2.exr", stripes(&mut || 0.001)),
         ("bad.exr", flat),
@@ -154,7 +118,7 @@ fn denoised_pictures_made_elsewhere() {
     }
 
     // What one picture alone has met, the other tiles may lack; a denoiser takes it for noise
-    let mut met = stripes(&mut random(1));
+    let mut met = stripes(&mut noise(1));
     met[20 * 64 + 20] = [3e4; 3];
     let (met_path, [a_again, b_again]) = (path("met.exr"), [&a, &b]);
     write_exr(&met_path, &RenderLayers::rgb(64, 64, &met)).unwrap();
@@ -275,7 +239,7 @@ fn a_denoiser_that_hangs_costs_no_samples() {
     assert_same_pictures(&killed, &whole);
 }
 
-/// To the bit, the map of what is left included.
+/// To the bit, the map of what is left included, and what was found of tiles that had stopped before.
 fn assert_same_pictures(one: &Path, other: &Path) {
     for name in ["image.exr", "image-denoised.exr"] {
         let pixels = |out: &Path| read_exr(out.join(name)).unwrap().pixels;
@@ -283,4 +247,8 @@ fn assert_same_pictures(one: &Path, other: &Path) {
     }
     let map = |out: &Path| std::fs::read(out.join("denoised-error.png")).unwrap();
     assert!(map(one) == map(other), "denoised-error.png");
+    for key in ["jods_lost", "spp_without", "guided"] {
+        let said = |out: &Path| json(&out.join("report.json"))["denoised"][key].clone();
+        assert_eq!(said(one), said(other), "{key}");
+    }
 }

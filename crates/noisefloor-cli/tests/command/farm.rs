@@ -1,5 +1,6 @@
 use crate::kit::{command, fail, json, run, said_json, stderr, succeed, text, wait_for};
 use noisefloor_image::{read_exr, read_facts};
+use noisefloor_testkit::Noise;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -51,7 +52,7 @@ fn killed_farms_give_the_picture_of_one_machine() {
     let (one, dir) = (folder.path().join("one"), folder.path().join("farm"));
     render(&one, SCENE);
     plan(&dir, &["--keep-shards"], SCENE);
-    let mut random = fastrand::Rng::with_seed(1);
+    let mut random = Noise::new(1);
     for kill in 0..4 {
         let mut first = coordinator(&dir);
         if kill == 0 {
@@ -68,7 +69,7 @@ fn killed_farms_give_the_picture_of_one_machine() {
             let killed = Command::new("kill").arg("-9").args(children.split_whitespace()).status().unwrap();
             assert!(killed.success(), "{children}");
         }
-        std::thread::sleep(Duration::from_millis(random.u64(50..600)));
+        std::thread::sleep(Duration::from_millis(50 + random.below(550) as u64));
         first.kill().unwrap();
         first.wait().unwrap();
     }
@@ -82,7 +83,7 @@ fn killed_farms_give_the_picture_of_one_machine() {
 
     // The shards alone give the same, in any order; without one of them, it is known what is missing
     let mut kept = shards(&frame.join("merged"));
-    random.shuffle(&mut kept);
+    kept.sort_by_cached_key(|_| random.bits());
     let merge = |kept: &[PathBuf], out: &Path| {
         run(&[&["farm", "merge", "--out", text(out)], &kept.iter().map(|p| text(p)).collect::<Vec<_>>()[..]]
             .concat())

@@ -68,6 +68,7 @@ fn a_finished_render_goes_on_if_more_is_asked_for() {
     assert!(complete() && samples() == 24 * 64 * 64);
     // Of a part that was cut short, too
     run(&render("64", &["--resume", "--time", "0.000001"]));
+    assert!(samples() > 24 * 64 * 64, "however short a run is, the next begins later");
     succeed(&render("64", &["--resume"]));
     assert!(complete() && samples() == 64 * 64 * 64, "{}", samples());
     assert!(!folder.path().join("checkpoint.nfc").exists());

@@ -1,5 +1,6 @@
-use crate::kit::{channel, fail, grey_exr, random, run, said_json, stderr, succeed, text, tiny};
+use crate::kit::{channel, fail, grey_exr, run, said_json, stderr, succeed, text, tiny};
 use noisefloor_image::{Picture, RenderLayers, SampleFacts, read_exr, read_facts, read_picture, write_exr};
+use noisefloor_testkit::Noise;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tempfile::{TempDir, tempdir};
@@ -124,36 +125,6 @@ fn extreme_counts_and_sizes_are_judged() {
     }
 }
 
-/// Renders of one seed contain one another: the second picture holds all samples of the first.
-#[test]
-fn stages_of_one_rendering_are_told_from_independent_ones() {
-    let folder = tempdir().unwrap();
-    let render =
-        |name: &str, seed: &str, spp: &str| rendered(&folder, name, &["--seed", seed, "--criterion", spp]);
-    let (first, later, other) =
-        (render("a", "1", "spp:64"), render("b", "1", "spp:80"), render("c", "2", "spp:80"));
-    // Mean visible noise, and whether shared samples were found
-    let verdict = |against: &PathBuf, more: &[&str]| {
-        let exr = folder.path().join("judged.exr");
-        let mut args = vec!["judge", text(&first), "--spp", "64", "--against", text(against), "--spp", "80"];
-        args.extend(["--tile", "32", "--json", "--exr", text(&exr)]);
-        args.extend(more);
-        let output = run(&args);
-        let noise = channel(&exr, "oracle.visible_noise");
-        let mean = noise.iter().sum::<f32>() / noise.len() as f32;
-        (mean, stderr(&output).contains("note: the pictures share samples"))
-    };
-    let (nested, told) = verdict(&later, &[]);
-    let (independent, told_independent) = verdict(&other, &[]);
-    assert!(told && !told_independent);
-    assert_eq!(verdict(&later, &["--nested"]), (nested, false));
-    // Both see the same noise. Taken for independent, the shared samples leave a third of it: of B = (64 A + 16
-    // C)/80, A − B is (A − C)/5.
-    let hidden = verdict(&later, &["--independent"]).0;
-    assert!((nested / independent - 1.0).abs() < 0.2, "{nested} {independent}");
-    assert!((0.2..0.5).contains(&(hidden / nested)), "{hidden} {nested}");
-}
-
 /// What `render` wrote says how many samples it has, and whether it shares them: nobody has to.
 #[test]
 fn our_own_files_say_what_they_are() {
@@ -180,6 +151,11 @@ fn our_own_files_say_what_they_are() {
     assert!(said.is_empty(), "{said}");
     let (typed, _) = judge(&other, &["--spp", "8", "--spp", "200", "--independent"]);
     assert_eq!(probability(&typed.unwrap()), probability(&independent.unwrap()));
+
+    // Whatever its depth is, a render of one seed shares its random numbers: pixels are not asked
+    let deep = rendered(&folder, "d", &["--seed", "1", "--criterion", "spp:200", "--max-depth", "9"]);
+    fail(&["judge", text(&first), "--against", text(&deep)], &["seed 1", "same random numbers", "another seed"]);
+    assert!(judge(&deep, &["--independent"]).0.is_ok());
 
     // What was typed counts, and is not passed over in silence
     let (_, said) = judge(&other, &["--spp", "9", "--spp", "200"]);
@@ -255,34 +231,6 @@ fn pictures_of_different_things_are_not_judged() {
     assert!(tiles[1..].iter().all(|tile| tile["unlike"] == false));
 }
 
-/// Renders of one seed share their random numbers, whatever their depth is: the files say so, and pixels are
-/// not asked.
-#[test]
-fn one_seed_is_dependent_whatever_else_differs() {
-    let folder = tempdir().unwrap();
-    let [shallow, deep, other] = [("1", "3"), ("1", "9"), ("2", "9")].map(|(seed, depth)| {
-        let more = ["--criterion", "spp:64", "--seed", seed, "--max-depth", depth];
-        rendered(&folder, &format!("{seed}-{depth}"), &more)
-    });
-    let judge = ["judge", text(&shallow), "--tile", "32", "--against"];
-    fail(&[&judge[..], &[text(&deep)]].concat(), &["seed 1", "same random numbers", "another seed"]);
-    succeed(&[&judge[..], &[text(&other)]].concat());
-    succeed(&[&judge[..], &[text(&deep), "--independent"]].concat());
-}
-
-/// The same evidence twice is no more evidence.
-#[test]
-fn the_same_picture_twice_is_refused() {
-    let folder = tempdir().unwrap();
-    let [a, b] = greys(&folder, (32, 32));
-    let (a, b) = (text(&a), text(&b));
-    let spp = ["--spp", "9", "--spp", "9", "--spp", "9", "--independent"];
-    fail(
-        &[&["judge", a, "--against", b, "--against", b][..], &spp].concat(),
-        &["count twice", "leave one out"],
-    );
-}
-
 /// What is not read of a picture is said: alpha, and all layers but one.
 #[test]
 fn what_is_not_read_of_a_picture_is_said() {
@@ -290,8 +238,8 @@ fn what_is_not_read_of_a_picture_is_said() {
     let folder = tempdir().unwrap();
     let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
     grey_exr(&b, (32, 32), 2, 0.4);
-    let mut noise = crate::kit::random(1);
-    let grey: Vec<f32> = (0..32 * 32).map(|_| 0.4 + 0.1 * noise() as f32).collect();
+    let mut noise = Noise::new(1);
+    let grey: Vec<f32> = (0..32 * 32).map(|_| 0.4 + 0.1 * noise.normal() as f32).collect();
     let said = |channels: &[(&str, f32)]| {
         let values = |value: f32| if value < 0.0 { grey.clone() } else { vec![value; 32 * 32] };
         let channel = |&(name, value): &(&str, f32)| AnyChannel::new(name, FlatSamples::F32(values(value)));
@@ -321,8 +269,8 @@ fn pictures_that_were_filtered_or_exposed_otherwise_are_noticed() {
     let folder = tempdir().unwrap();
     let size = (64, 64);
     let noise = |seed: u64| -> Vec<f32> {
-        let mut random = crate::kit::random(seed);
-        (0..64 * 64).map(|i| (0.3 + 0.004 * (i % 64) as f32) * (1.0 + 0.2 * random() as f32)).collect()
+        let mut noise = Noise::new(seed);
+        (0..64 * 64).map(|i| (0.3 + 0.004 * (i % 64) as f32) * (1.0 + 0.2 * noise.normal() as f32)).collect()
     };
     let write = |name: &str, values: &[f32]| {
         let path = folder.path().join(name);
@@ -374,10 +322,10 @@ fn frames_are_judged_and_the_exit_code_tells() {
     let folder = tempdir().unwrap();
     let name = |name: &str| folder.path().join(name);
     let noise = |path: PathBuf, seed: u64, deviation: f64| {
-        let mut random = random(seed);
+        let mut random = Noise::new(seed);
         // The lower right tile has twice the noise
         let pixel = |i: usize| {
-            let noise = random() * if i % 64 > 31 && i > 2048 { 2.0 } else { 1.0 };
+            let noise = random.normal() * if i % 64 > 31 && i > 2048 { 2.0 } else { 1.0 };
             [(0.4 + deviation * noise) as f32; 3]
         };
         let pixels: Vec<[f32; 3]> = (0..64 * 64).map(pixel).collect();

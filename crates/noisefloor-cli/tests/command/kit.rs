@@ -1,5 +1,5 @@
 use noisefloor_image::{RenderLayers, write_exr};
-use noisefloor_testkit::HANG;
+use noisefloor_testkit::{HANG, Noise};
 use serde_json::Value;
 use std::fmt::Debug;
 use std::path::Path;
@@ -117,21 +117,8 @@ pub(crate) fn said_json(args: &[&str]) -> Value {
 
 /// An EXR of noise around grey, drawn from (seed, pixel); pixel 0 is `first`.
 pub(crate) fn grey_exr(path: &Path, (width, height): (usize, usize), seed: u64, first: f32) {
-    let mut random = random(seed);
-    let mut rgb: Vec<[f32; 3]> = (0..width * height).map(|_| [0.4 + 0.1 * random() as f32; 3]).collect();
+    let mut noise = Noise::new(seed);
+    let mut rgb: Vec<[f32; 3]> = (0..width * height).map(|_| [0.4 + 0.1 * noise.normal() as f32; 3]).collect();
     rgb[0] = [first; 3];
     write_exr(path, &RenderLayers::rgb(width, height, &rgb)).unwrap();
-}
-
-/// Standard normal numbers by the sum of twelve uniform ones.
-pub(crate) fn random(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            sum += (state >> 40) as f64 / f64::from(1u32 << 24);
-        }
-        sum
-    }
 }

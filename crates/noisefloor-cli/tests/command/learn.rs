@@ -1,8 +1,9 @@
-use crate::kit::{column, fail, json, random, run, said_json, succeed, text};
+use crate::kit::{column, fail, json, run, said_json, succeed, text};
 use noisefloor::evidence::Evidence;
 use noisefloor_image::{RenderLayers, write_exr, write_png};
 use noisefloor_learn::read_table;
 use noisefloor_study::explore::{Disagreements, TileAnswer};
+use noisefloor_testkit::Noise;
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,7 @@ fn rows(scene: &str, index: usize, at: impl Fn(usize) -> (usize, usize)) -> Stri
 /// Running means of a zone after each level, in display values: a grey checker and white noise. Checkers
 /// differ within a scene, so that no scene has textures that no other one has.
 fn running_means(scene: usize, zone: usize) -> Vec<Vec<f64>> {
-    let mut random = random((scene * 16 + zone + 1) as u64 * 7919);
+    let mut noise = Noise::keyed(&[scene as u64, zone as u64]);
     let (grey, sigma) = (0.4 + 0.05 * zone as f64, deviation(scene, zone));
     let contrast = 0.02 + 0.03 * ((zone + scene) % ZONES) as f64;
     let clean =
@@ -43,7 +44,7 @@ fn running_means(scene: usize, zone: usize) -> Vec<Vec<f64>> {
     for last in LEVELS {
         let new = f64::from(last - first);
         for (i, sum) in sums.iter_mut().enumerate() {
-            *sum += new * clean(i) + new.sqrt() * sigma * random();
+            *sum += new * clean(i) + new.sqrt() * sigma * noise.normal();
         }
         means.push(sums.iter().map(|sum| sum / f64::from(last)).collect());
         first = last;

@@ -115,42 +115,6 @@ fn short<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[test]
-fn what_was_killed_goes_on_to_the_bit() {
-    let (whole, broken) = (tempdir().unwrap(), tempdir().unwrap());
-    succeed(&short(text(whole.path()), &[]));
-    let out = broken.path();
-    let mut child = command(&short(text(out), &[])).spawn().unwrap();
-    // The report is written last
-    wait_for("the first save", || out.join("report.json").exists().then_some(()));
-    signal(&child, "-KILL");
-    child.wait().unwrap();
-    let samples = |out: &Path| json(&out.join("report.json"))["samples"].as_u64().unwrap();
-
-    // In small steps, then to the end
-    for _ in 0..2 {
-        let before = samples(out);
-        succeed(&short(text(out), &["--resume", "--time", "0.1"]));
-        assert!(before < samples(out) && samples(out) < samples(whole.path()));
-        assert_eq!(json(&out.join("report.json"))["complete"], false);
-    }
-    succeed(&short(text(out), &["--resume"]));
-    let pixels = |out: &Path| read_exr(out.join("image.exr")).unwrap().pixels;
-    assert!(pixels(out) == pixels(whole.path()));
-    let stops = |out: &Path| std::fs::read(out.join("stops.csv")).unwrap();
-    assert_eq!(stops(out), stops(whole.path()));
-    let report = json(&out.join("report.json"));
-    assert_eq!(report["complete"], true);
-    assert!(report["seconds_before"].as_f64().unwrap() > 0.0);
-    assert!(!out.join("checkpoint.nfc").exists());
-    let (_, rows) = table(&out.join("timeline.csv"));
-    let samples: Vec<u64> = rows.iter().map(|row| row[1].parse().unwrap()).collect();
-    assert!(
-        samples.is_sorted()
-            && samples.last() == Some(&json(&whole.path().join("report.json"))["samples"].as_u64().unwrap())
-    );
-}
-
-#[test]
 fn a_checkpoint_of_another_render_is_refused() {
     let folder = tempdir().unwrap();
     let out = text(folder.path());

@@ -1,6 +1,6 @@
-use crate::kit::{column, command, fail, grey_exr, json, random, succeed, text};
+use crate::kit::{column, command, fail, grey_exr, json, succeed, text};
 use noisefloor_image::{Picture, RenderLayers, read_exr, read_picture, write_exr};
-use noisefloor_testkit::{Requirement, require, require_python};
+use noisefloor_testkit::{Noise, Requirement, require, require_python};
 use std::path::Path;
 use tempfile::tempdir;
 
@@ -38,8 +38,8 @@ fn what_tiles_wait_for_is_said() {
     let (stack, out) = (folder.path().join("stack"), folder.path().join("out"));
     std::fs::create_dir(&stack).unwrap();
     for (seed, name) in ["batch_0_8.exr", "batch_8_16.exr"].iter().enumerate() {
-        let mut noise = random(seed as u64);
-        let mut pixels: Vec<[f32; 3]> = (0..256 * 256).map(|_| [0.4 + 0.001 * noise() as f32; 3]).collect();
+        let mut noise = Noise::new(seed as u64);
+        let mut pixels: Vec<[f32; 3]> = (0..256 * 256).map(|_| [0.4 + 0.001 * noise.normal() as f32; 3]).collect();
         pixels[70 * 256 + 80] = [[0.4; 3], [3e4; 3]][seed];
         write_exr(stack.join(name), &RenderLayers::rgb(256, 256, &pixels)).unwrap();
     }
