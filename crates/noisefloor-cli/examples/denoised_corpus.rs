@@ -227,10 +227,7 @@ fn levels(folder: &Path, scene: &Opened, seed: u64, most: u64) -> Outcome<()> {
         std::fs::write(folder.join("counts.csv"), &counts)?;
     }
     let (width, height) = size;
-    Ok(std::fs::write(
-        folder.join("samples.csv"),
-        format!("width,height,clean\n{width},{height},{clean}\n"),
-    )?)
+    Ok(std::fs::write(folder.join("samples.csv"), format!("width,height,clean\n{width},{height},{clean}\n"))?)
 }
 
 fn average(pixels: impl Iterator<Item = Rgb>) -> Rgb {

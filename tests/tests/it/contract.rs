@@ -30,7 +30,7 @@ fn its_reference_is_free_of_noise_to_the_oracle() {
     for name in ["cornell-box", "courtyard", "glass-spheres"] {
         let make = |seed| {
             let options = RenderOptions { seed, ..RenderOptions::default() };
-            Ptwne::new(scenes::by_name(name).unwrap(), 2 * SIZE.0, 2 * SIZE.1, options).unwrap()
+            Ptwne::new(scenes::by_name(name).unwrap(), SIZE.0, SIZE.1, options).unwrap()
         };
         check_reference(make, |source| source.reference().map(Some));
     }

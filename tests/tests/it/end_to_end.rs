@@ -129,14 +129,14 @@ fn running_means_stop_where_batches_do() {
 
 #[test]
 fn a_fixed_number_of_samples_is_that_everywhere() {
-    let fixed = run(cornell(), FixedSpp(200), small_tiles());
-    assert_eq!(fixed.samples(), [200; 9]);
+    let fixed = run(cornell(), FixedSpp(96), small_tiles());
+    assert_eq!(fixed.samples(), [96; 9]);
     assert!(fixed.stops.iter().all(|s| s.reason == StopReason::ReachedSpp && s.probability.is_none()));
 
     // Which is the picture that one call gives, but for rounding; no halves were kept
     let tile = noisefloor::Tile { index: 0, x: 0, y: 0, width: 96, height: 96 };
-    let whole = cornell().sample(&[noisefloor::Request::new(tile, 0, 200)]).unwrap().remove(0);
-    assert!(fixed.halves.iter().all(|&h| h == [200, 0]));
+    let whole = cornell().sample(&[noisefloor::Request::new(tile, 0, 96)]).unwrap().remove(0);
+    assert!(fixed.halves.iter().all(|&h| h == [96, 0]));
     for (a, b) in fixed.image.iter().flatten().zip(whole.mean.iter().flatten()) {
         assert!((a - b).abs() <= 1e-6 * b.abs(), "{a} {b}");
     }

@@ -213,7 +213,6 @@ fn a_dot_that_is_seen_is_in_no_tile_that_stops() {
     assert!(seen > 1000 && stopped > 0, "{seen} {stopped}");
 }
 
-/// Two pictures of one view are the halves of a session: one number for both, whichever comes first.
 /// One sample of 10,000 times the light of its picture holds the four tiles whose windows have it, and no other: these take a
 /// tenth more samples at most, over all twelve, where one that waits would take five times as many.
 #[test]
@@ -249,6 +248,7 @@ fn a_dot_holds_no_tile_that_it_does_not_touch() {
     assert!(10 * with <= 11 * without, "{with} {without}");
 }
 
+/// Two pictures of one view are the halves of a session: one number for both, whichever comes first.
 #[test]
 fn two_pictures_are_two_halves() {
     let mut noise = Noise::new(5);

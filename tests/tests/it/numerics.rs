@@ -124,8 +124,8 @@ fn uneven_halves_have_the_noise_of_their_mean() {
 /// judged, it is the noise of the picture, and all tiles wait.)
 #[test]
 fn one_firefly_leaves_the_other_tiles_alone() {
-    let clean = run(Synthetic::new(800, 608), tiles_of(64));
-    let source = Altered::batches(Synthetic::new(800, 608), |requests, batches| {
+    let clean = run(Synthetic::new(576, 448), tiles_of(64));
+    let source = Altered::batches(Synthetic::new(576, 448), |requests, batches| {
         for (request, batch) in requests.iter().zip(batches.iter_mut()) {
             if request.tile.index == 0 && request.first == 0 {
                 batch.mean[5 + 64 * 5] = [1e12 / batch.spp as f32; 3];

@@ -149,7 +149,6 @@ fn memory_is_flat_over_a_thousand_calls() {
     }
 }
 
-/// A file that Blender saved, with an image inside, is the scene that the script made.
 /// By its own noise threshold a renderer renders the same scene; a finer one leaves less noise, which is that of other
 /// random numbers with another seed; and samples are as before.
 fn adapts(mut source: Sidecar, repeats: bool) {
@@ -217,6 +216,7 @@ fn luxcore_samples_by_its_own_threshold() {
     }
 }
 
+/// A file that Blender saved, with an image inside, is the scene that the script made.
 #[test]
 fn a_blend_file_is_what_was_saved() {
     if !usable(&noisefloor_cycles::RENDERER) {

@@ -10,6 +10,7 @@ use noisefloor_ptwne::{
 };
 use noisefloor_testkit::check_silence;
 use noisefloor_tests::mistakes::{Mistake, Outcome, Samples, feed};
+use std::sync::Arc;
 
 /// Every scene that the renderer has, with its samplers and filters in turn.
 #[test]
@@ -48,14 +49,15 @@ fn two_values(ior: Option<f32>) -> Scene {
 #[test]
 fn own_samples_are_never_accused() {
     let rendered = scenes::list().chain(scenes::stiff()).map(|scene| scene.name);
-    let mut jobs: Vec<_> = rendered.map(|name| (scenes::by_name(name).unwrap(), 4)).collect();
-    jobs.extend([1.33, 1.45, 1.5, 1.6034, 1.8, 2.4, 3.5].map(|ior| (two_values(Some(ior)), 16)));
-    jobs.push((two_values(None), 16));
+    let mut jobs: Vec<(Arc<Scene>, u64)> =
+        rendered.map(|name| (scenes::by_name(name).unwrap().into(), 4)).collect();
+    jobs.extend([1.33, 1.45, 1.5, 1.6034, 1.8, 2.4, 3.5].map(|ior| (two_values(Some(ior)).into(), 16)));
+    jobs.push((two_values(None).into(), 16));
     let mut runs = 0;
     for (scene, seeds) in jobs {
         for seed in 1..=seeds {
             let options = RenderOptions { seed, ..RenderOptions::default() };
-            let source = Ptwne::new(scene.clone(), 32, 32, options).unwrap();
+            let source = Ptwne::new(Arc::clone(&scene), 32, 32, options).unwrap();
             let (criterion, spp): (Box<dyn StoppingCriterion>, _) =
                 if seed % 2 == 0 { (Box::new(FixedSpp(64)), 64) } else { (Box::new(Oracle::bundled()), 96) };
             let mut driver = Driver::new(source, criterion, Params::default().with_max_spp(spp)).unwrap();

@@ -55,7 +55,8 @@ fn renders_stop_for_the_eyes_that_are_kept() {
         (json(&out.join("report.json")), stderr(&output), column(&out.join("stops.csv"), "spp"))
     };
     let spp = |stops: &[String]| stops.iter().map(|spp| spp.parse::<f64>().unwrap()).sum::<f64>();
-    let whole = ["--max-spp", "4000"];
+    let whole = ["--size", "32x32", "--max-spp", "4000"];
+    let short = ["--max-spp", "16"];
     let (report, said, mine) = render("mine", &whole);
     assert!(
         said.contains("for the eyes of me (2.00 times") && said.contains("38 pixels per degree"),
@@ -65,7 +66,7 @@ fn renders_stop_for_the_eyes_that_are_kept() {
     let (_, said, theirs) = render("theirs", &[&whole[..], &["--eyes", "none"]].concat());
     assert!(!said.contains("eyes of me"), "{said}");
     assert!(spp(&mine) > 1.3 * spp(&theirs), "{mine:?} {theirs:?}");
-    let (_, said, _) = render("typed", &["--audience", "1,0"]);
+    let (_, said, _) = render("typed", &[&short[..], &["--audience", "1,0"]].concat());
     assert!(!said.contains("eyes of me"), "{said}");
 
     // A studio: nine of ten are content, of three the one who needs most
@@ -73,14 +74,15 @@ fn renders_stop_for_the_eyes_that_are_kept() {
     for (name, factor) in [("a", 0.5), ("b", 3.0), ("c", 1.0)] {
         keep(&studio, name, factor, &digest);
     }
-    let (_, said, _) = render("studio", &["--eyes", text(&studio), "--criterion", "oracle"]);
+    let (_, said, _) =
+        render("studio", &[&short[..], &["--eyes", text(&studio), "--criterion", "oracle"]].concat());
     assert!(said.contains("for the eyes of b (3.00 times"), "{said}");
     let shown = succeed(&["calibrate", "--show", "--out", text(&studio)]);
     assert!(shown.contains("b: 3.00 times") && shown.lines().count() == 4, "{shown}");
 
     // Somebody of another model is left out, by name, and is no reason against the others
     keep(&studio, "old", 9.0, "another");
-    let (_, said, _) = render("left-out", &["--eyes", text(&studio)]);
+    let (_, said, _) = render("left-out", &[&short[..], &["--eyes", text(&studio)]].concat());
     assert!(said.contains("the eyes of old were measured") && said.contains("for the eyes of b"), "{said}");
     // Beside other criteria it is opened, and said to have no effect
     let (_, said, _) = render("unused", &["--eyes", text(&studio), "--criterion", "spp:8"]);
@@ -97,7 +99,7 @@ fn renders_stop_for_the_eyes_that_are_kept() {
     fail(&both, &["--eyes and --viewing both"]);
     fail(&tiny(text(&out), &["--eyes", text(&home.path().join("absent"))]), &["absent"]);
     keep(&own, "me", 2.0, "another");
-    let (_, said, _) = render("stale", &[]);
+    let (_, said, _) = render("stale", &short);
     assert!(said.contains("beside another model, and are not used"), "{said}");
     std::fs::write(&own, "colour = 1").unwrap();
     let output = command(&tiny(text(&out), &[])).env("XDG_CONFIG_HOME", home.path()).output().unwrap();

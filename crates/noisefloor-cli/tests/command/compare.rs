@@ -78,8 +78,8 @@ fn a_reference_is_rendered_on() {
     let render = |out: &str, spp: &str| {
         let out = folder.path().join(out);
         let small =
-            ["compare", "cornell-box", "--size", "64x64", "--tile", "32", "--max-spp", "100", "--quiet"];
-        let more = ["--criteria", "spp:100", "--reference-spp", spp, "--force", "--out", text(&out)];
+            ["compare", "cornell-box", "--size", "32x32", "--tile", "32", "--max-spp", "20", "--quiet"];
+        let more = ["--criteria", "spp:20", "--reference-spp", spp, "--force", "--out", text(&out)];
         succeed(&[&small[..], &more].concat());
         let image = noisefloor_image::read_exr(out.join("cornell-box/reference.exr")).unwrap();
         (image.pixels, json(&out.join("cornell-box/reference.json"))["spp"].as_u64())
@@ -121,7 +121,7 @@ fn pictures_are_compared_denoised_too() {
     let job =
         ["compare", "cornell-box", "--size", "64x64", "--tile", "32", "--max-spp", "200", "--batch", "20"];
     let more =
-        ["--reference-spp", "1500", "--denoise", "oidn", "--criteria", "spp:20,denoised:1", "--out", out];
+        ["--reference-spp", "800", "--denoise", "oidn", "--criteria", "spp:20,denoised:1", "--out", out];
     let said = succeed(&[&job[..], &more].concat());
     assert!(said.lines().filter(|line| line.contains("denoised: JOD")).count() == 2, "{said}");
     let numbers = |file: &str, name: &str| -> Vec<f64> {

@@ -123,9 +123,10 @@ fn run_with_files_of(blocks: u32, args: &[&str]) -> Output {
 fn a_disk_that_is_full_is_an_error_and_spoils_nothing() {
     let folder = tempdir().unwrap();
     let out = folder.path();
-    succeed(&arguments(text(out), &[]));
+    let render = ["render", "--size", "64x64", "--criterion", "spp:8", "--quiet", "--out", text(out)];
+    succeed(&render);
     let before = std::fs::read(out.join("image.exr")).unwrap();
-    let output = run_with_files_of(16, &arguments(text(out), &["--seed", "2", "--force"]));
+    let output = run_with_files_of(16, &[&render[..], &["--seed", "2", "--force"]].concat());
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("not written") && said.contains("check the space on the disk"), "{said}");

@@ -1,6 +1,4 @@
-use crate::kit::{
-    FILES, column, command, fail, json, run, stderr, succeed, text, tiny, wait_for, words,
-};
+use crate::kit::{FILES, column, command, fail, json, run, stderr, succeed, text, tiny, wait_for, words};
 use noisefloor_denoise::OIDN;
 use noisefloor_image::{RenderLayers, read_exr, write_exr};
 use noisefloor_sidecar::find;

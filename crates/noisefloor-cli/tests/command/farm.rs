@@ -7,9 +7,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use tempfile::tempdir;
 
-/// Of 24 tiles: some stop early, some late, and one round has several tasks.
+/// Of 12 tiles: some stop early, some late, and one round has several tasks.
 pub(crate) const SCENE: &str =
-    "cornell-box --size 192x128 --tile 32 --batch 40 --max-spp 160 --seed 5 --threads 1";
+    "cornell-box --size 128x96 --tile 32 --batch 40 --max-spp 160 --seed 5 --threads 1";
 
 pub(crate) fn render(out: &Path, scene: &str) {
     let args = ["render", "--quiet", "--out", text(out)];
@@ -69,7 +69,7 @@ fn killed_farms_give_the_picture_of_one_machine() {
             let killed = Command::new("kill").arg("-9").args(children.split_whitespace()).status().unwrap();
             assert!(killed.success(), "{children}");
         }
-        std::thread::sleep(Duration::from_millis(50 + random.below(550) as u64));
+        std::thread::sleep(Duration::from_millis(50 + random.below(250) as u64));
         first.kill().unwrap();
         first.wait().unwrap();
     }

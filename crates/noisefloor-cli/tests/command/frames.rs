@@ -380,7 +380,7 @@ fn presets_ask_for_less_and_for_more() {
     let samples = |preset: &[&str], name: &str| {
         let out = folder.path().join(name);
         // One that needs more than the 100 samples that small pictures get in any case
-        let scene = ["render", "glass-spheres", "--size", "32x32", "--tile", "32"];
+        let scene = ["render", "needles", "--size", "32x32", "--tile", "32"];
         let args = [&scene[..], &["--batch", "16", "--max-spp", "4000", "--quiet", "--out"]].concat();
         succeed(&[&args[..], &[text(&out)], preset].concat());
         json(&out.join("report.json"))["samples"].as_u64().unwrap()

@@ -118,7 +118,8 @@ pub(crate) fn said_json(args: &[&str]) -> Value {
 /// An EXR of noise around grey, drawn from (seed, pixel); pixel 0 is `first`.
 pub(crate) fn grey_exr(path: &Path, (width, height): (usize, usize), seed: u64, first: f32) {
     let mut noise = Noise::new(seed);
-    let mut rgb: Vec<[f32; 3]> = (0..width * height).map(|_| [0.4 + 0.1 * noise.normal() as f32; 3]).collect();
+    let mut rgb: Vec<[f32; 3]> =
+        (0..width * height).map(|_| [0.4 + 0.1 * noise.normal() as f32; 3]).collect();
     rgb[0] = [first; 3];
     write_exr(path, &RenderLayers::rgb(width, height, &rgb)).unwrap();
 }

@@ -12,7 +12,8 @@ fn talkers() -> (TempDir, Vec<Vec<String>>) {
     std::fs::copy(scene, folder.path().join("box.xml")).unwrap();
     std::fs::write(folder.path().join("pairs.csv"), "observers,audience\n1,2\n2,4\n3,6\n").unwrap();
     let judge = "judge @/a.exr --spp 9 --against @/b.exr --spp 9 --tile 32 --independent";
-    let compare = "compare bulb --size 32x32 --tile 32 --criteria spp:4 --max-spp 100 --reference-spp 4 --out";
+    let compare =
+        "compare bulb --size 32x32 --tile 32 --criteria spp:4 --max-spp 100 --reference-spp 4 --out";
     let lines = [
         "scenes",
         "inspect",

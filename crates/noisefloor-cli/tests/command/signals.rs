@@ -98,13 +98,13 @@ fn what_is_reproduced_so_far_survives_an_interrupt() {
     let (corpora, folder) = (Corpora::new(), tempdir().unwrap());
     let out = folder.path();
     let [means, batches] = &corpora.paths;
-    let args = ["reproduce", "--edge", "64", "--levels", "100", "--corpus", text(means), text(batches)];
+    let args = ["reproduce", "--edge", "64", "--levels", "60", "--corpus", text(means), text(batches)];
     let child = command(&args).args(["--out", text(out)]).stderr(Stdio::null()).spawn().unwrap();
     let first = out.join("luminance-pair-display-learned.json");
     wait_for("the first result", || first.exists().then_some(()));
     signal(&child, "-INT");
     assert_eq!(end(child).code(), Some(130));
-    assert_eq!(json(&first)["machines"][0]["examples"], 1200);
+    assert_eq!(json(&first)["machines"][0]["examples"], 720);
     assert!(!out.join("reproduce.json").exists());
 }
 

@@ -39,7 +39,8 @@ fn what_tiles_wait_for_is_said() {
     std::fs::create_dir(&stack).unwrap();
     for (seed, name) in ["batch_0_8.exr", "batch_8_16.exr"].iter().enumerate() {
         let mut noise = Noise::new(seed as u64);
-        let mut pixels: Vec<[f32; 3]> = (0..256 * 256).map(|_| [0.4 + 0.001 * noise.normal() as f32; 3]).collect();
+        let mut pixels: Vec<[f32; 3]> =
+            (0..256 * 256).map(|_| [0.4 + 0.001 * noise.normal() as f32; 3]).collect();
         pixels[70 * 256 + 80] = [[0.4; 3], [3e4; 3]][seed];
         write_exr(stack.join(name), &RenderLayers::rgb(256, 256, &pixels)).unwrap();
     }

@@ -23,8 +23,7 @@ fn samples_that_were_found_are_enough_for_other_seeds() {
         assert!(keep.join(name).exists(), "{name}");
     }
     assert_eq!(json(&keep.join("tune.json"))["setting"], report["setting"]);
-    // The same again, in one word; and not over what is there
-    assert_eq!(succeed(&SMALL).trim(), setting.to_string());
+    // Not over what is there
     let again = ["tune", "cornell-box", "--size", "64x64", "--keep", text(&keep)];
     fail(&again, &["tune.json", "--force"]);
 
@@ -53,8 +52,7 @@ fn frames_of_a_film_need_fewer_samples() {
     let (still, film) = (tune(&[]), tune(&["--fps", "24"]));
     println!("{still} samples of a still, {film} of a frame");
     assert!(film < 0.8 * still, "{film} of {still}");
-    assert_eq!(tune(&["--viewing", "desk,fps=24"]), film);
-    let said = succeed(&["tune", "cornell-box", "--size", "64x64", "--fps", "24"]);
+    let said = succeed(&["tune", "cornell-box", "--size", "64x64", "--viewing", "desk,fps=24"]);
     assert!(said.contains("fps=24") && said.contains("come from stills"), "{said}");
     // What other settings would leave and take, with the one that was found: more samples leave less, and take longer
     let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
@@ -260,7 +258,7 @@ fn only_the_worst_places_are_looked_at_again() {
 /// Tiles of the worst place alone get more samples, which find what all of them would.
 #[test]
 fn samples_are_found_in_the_worst_place_alone() {
-    let args = ["tune", "cornell-box", "--size", "256x128", "--json"];
+    let args = ["tune", "cornell-box", "--size", "192x96", "--json"];
     let search = |more: &[&str]| said_json(&[&args, more].concat());
     let (all, some) = (search(&[]), search(&["--regions", "1"]));
     assert_eq!(some["regions"].as_array().unwrap().len(), 1, "{some}");
@@ -281,6 +279,7 @@ fn a_search_for_samples_is_resumed() {
     let setting = succeed(&args);
     let report = keep.join("tune.json");
     let mut cut = json(&report);
+    assert_eq!(setting.trim(), cut["setting"].as_f64().unwrap().to_string(), "in one word");
     cut["steps"].as_array_mut().unwrap().pop();
     std::fs::write(&report, cut.to_string()).unwrap();
     assert_eq!(succeed(&[&args[..], &["--resume"]].concat()), setting);

@@ -107,16 +107,25 @@ fn a_few_bytes_cannot_be_many_pixels() {
 fn channels_beside_the_picture_are_in_proportion_to_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hostile.exr");
-    let black = vec![0.0; 512 * 512];
     let names: Vec<String> = (0..1200).map(|i| format!("pass{i}.V")).collect();
-    let passes = |count: usize| {
+    let write = |count: usize, edge: usize| {
+        let black = f32s(&vec![0.0; edge * edge]);
         let passes = names[..count].iter().map(String::as_str);
-        let channels = passes.chain(["R", "G", "B"]).map(|name| (name, f32s(&black))).collect();
-        make_exr(&path, (512, 512), channels, Compression::ZIP16, (0, 0), None);
-        read_picture(&path).map(|picture| picture.size())
+        let channels = passes.chain(["R", "G", "B"]).map(|name| (name, black.clone())).collect();
+        make_exr(&path, (edge, edge), channels, Compression::ZIP16, (0, 0), None);
     };
-    assert_eq!(passes(100).unwrap(), (512, 512));
-    let error = passes(1200).unwrap_err().to_string();
+    write(100, 256);
+    assert_eq!(read_picture(&path).unwrap().size(), (256, 256));
+    // To write 1200 channels of 8192×32 pixels would take long: those of 32×32 are said to be as large, in a file of 1 MiB
+    write(1200, 32);
+    let mut bytes = std::fs::read(&path).unwrap();
+    for window in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+        let at = bytes.windows(window.len()).position(|bytes| bytes == window).unwrap() + window.len() + 4;
+        bytes[at + 8..at + 12].copy_from_slice(&8191i32.to_le_bytes());
+    }
+    bytes.resize(1 << 20, 0);
+    std::fs::write(&path, bytes).unwrap();
+    let error = read_picture(&path).unwrap_err().to_string();
     assert!(error.contains("out of proportion to the file; save the picture by itself"), "{error}");
 }
 

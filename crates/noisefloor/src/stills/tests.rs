@@ -99,7 +99,10 @@ fn the_same_picture_is_not_pooled_with_itself() {
     let twice = [&plain(&other), &plain(&other)];
     let error = SnapshotPair::new(Evidence::Halves, &plain(&image), &twice, tone, samples).unwrap_err();
     assert!(matches!(error, StillError::Twice(_)), "{error}");
-    assert!(["count twice", "leave one out"].iter().all(|words| error.to_string().contains(words)), "{error}");
+    assert!(
+        ["count twice", "leave one out"].iter().all(|words| error.to_string().contains(words)),
+        "{error}"
+    );
 }
 
 /// A wall of 128×128 pixels, rendered twice with 512 samples, of which one alone has found a lamp in the first of 16 tiles: the others are

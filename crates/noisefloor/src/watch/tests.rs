@@ -254,9 +254,9 @@ fn a_pixel_filter_is_a_warning_unless_it_was_announced() {
 #[test]
 fn what_is_likely_is_said_once_with_its_number() {
     // Every second batch mirrors the one before at the mean, as complementary points do
+    let mean = batch(1, 1000);
     let (fault, _, warnings) = feed(400, |count| {
         let image = batch(1 + count / 2, SPP);
-        let mean = batch(1, 1000);
         (SPP, if count % 2 == 0 { image } else { mixed(1.6, &mean, -0.6, &image) })
     });
     assert_eq!(fault, None);
