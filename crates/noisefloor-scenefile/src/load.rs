@@ -89,6 +89,15 @@ impl Load {
         place.at_most("pixels in all pictures so far", self.pixels.get(), MAX_PIXELS)
     }
 
+    /// An index of refraction of a conductor. Values a little below 0, which fits of measurements have, count as 0.
+    pub(crate) fn conductor_index(&self, place: &Place, name: &str, index: Rgb) -> Rgb {
+        let nearest = index.map(|n| n.clamp(0.0, 100.0));
+        if nearest != index {
+            self.approximated(place, format_args!("`{name}` is {index:?}, and is brought into 0…100"));
+        }
+        nearest
+    }
+
     /// Textures as one, whose pixels `put` makes of their colours.
     pub(crate) fn combined<const N: usize>(
         &self,

@@ -309,7 +309,9 @@ impl<'d> Context<'d> {
         // Relative to what is outside
         let outside = self.ior(element, "ext_eta", "vacuum")? as f32;
         let relative = |index: Rgb| index.map(|n| n / outside);
-        let (eta, k) = (self.clamped(element, "eta", relative(eta)), self.clamped(element, "k", relative(k)));
+        let place = self.place(element);
+        let clamped = |name: &str, index: Rgb| self.load.conductor_index(&place, name, relative(index));
+        let (eta, k) = (clamped("eta", eta), clamped("k", k));
         Ok(surface(Material::Conductor { eta, k, reflectance, roughness }))
     }
 
@@ -412,15 +414,6 @@ impl<'d> Context<'d> {
         };
         let texture = self.varying(element, texture)?;
         self.one_channel(element, texture)
-    }
-
-    /// An index of refraction of a conductor, at least 0, with a warning if it is not.
-    fn clamped(&self, element: &Element, name: &str, index: Rgb) -> Rgb {
-        let nearest = index.map(|n| n.clamp(0.0, 100.0));
-        if nearest != index {
-            self.approximated(element, format!("`{name}` is {index:?}, and is brought into 0…100"));
-        }
-        nearest
     }
 
     /// A number; of a colour the mean of its channels, as in Mitsuba; of a texture its mean, with a warning.

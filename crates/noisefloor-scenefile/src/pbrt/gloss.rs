@@ -42,15 +42,10 @@ impl Reader<'_> {
         Ok((u * v).max(0.0).sqrt().min(1.0))
     }
 
-    /// η or k of a conductor. Values a little below 0, which fits of measurements have, count as 0.
+    /// η or k of a conductor.
     pub(super) fn metal_index(&mut self, d: &Definition, name: &str) -> Result<Option<Rgb>, LoadError> {
-        let Some(index) = self.signed(&d.params, name)? else { return Ok(None) };
-        let nearest = index.map(|x| x.clamp(0.0, 100.0));
-        if nearest != index {
-            let what = format!("`{name}` is {index:?}, and is brought into 0…100");
-            self.load.approximated(&d.params.place, what);
-        }
-        Ok(Some(nearest))
+        let index = self.signed(&d.params, name)?;
+        Ok(index.map(|index| self.load.conductor_index(&d.params.place, name, index)))
     }
 
     /// `disney`, of version 3.

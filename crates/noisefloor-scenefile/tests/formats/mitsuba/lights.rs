@@ -101,24 +101,18 @@ fn maps_lie_as_in_mitsuba() {
     let columns: Vec<[f32; 3]> = (0..2 * 8).map(|i| [(i % 8) as f32, 0.0, 1.0]).collect();
     let folder = Folder::new().with_exr("sky.exr", 8, &columns).with_png("sky.png", 1, &[[255, 188, 0, 255]]);
     for (more, want) in [
-        ("", [3.5, 0.0, 1.0]),
-        (r#"<float name="scale" value="2"/>"#, [7.0, 0.0, 2.0]),
-        (r#"<transform name="to_world"><rotate y="1" angle="90"/></transform>"#, [1.5, 0.0, 1.0]),
-        (r#"<transform name="to_world"><rotate y="1" angle="-90"/></transform>"#, [5.5, 0.0, 1.0]),
+        (String::new(), [3.5, 0.0, 1.0]),
+        (r#"<float name="scale" value="2"/>"#.to_owned(), [7.0, 0.0, 2.0]),
+        (to_world(r#"<rotate y="1" angle="90"/>"#), [1.5, 0.0, 1.0]),
+        (to_world(r#"<rotate y="1" angle="-90"/>"#), [5.5, 0.0, 1.0]),
         // Mirrored after it is turned
-        (
-            r#"<transform name="to_world"><rotate y="1" angle="90"/><scale x="-1"/></transform>"#,
-            [1.5, 0.0, 1.0],
-        ),
-        (
-            r#"<transform name="to_world"><scale x="-1"/><rotate y="1" angle="90"/></transform>"#,
-            [5.5, 0.0, 1.0],
-        ),
-        (r#"<transform name="to_world"><scale z="-3" x="3" y="3"/></transform>"#, [3.5, 0.0, 1.0]),
+        (to_world(r#"<rotate y="1" angle="90"/><scale x="-1"/>"#), [1.5, 0.0, 1.0]),
+        (to_world(r#"<scale x="-1"/><rotate y="1" angle="90"/>"#), [5.5, 0.0, 1.0]),
+        (to_world(r#"<scale z="-3" x="3" y="3"/>"#), [3.5, 0.0, 1.0]),
     ] {
         let body =
             format!(r#"<emitter type="envmap"><string name="filename" value="sky.exr"/>{more}</emitter>"#);
-        close(folder.see(&body), want, 2e-3, more);
+        close(folder.see(&body), want, 2e-3, &more);
     }
     // Codes are decoded
     let body = r#"<emitter type="envmap"><string name="filename" value="sky.png"/></emitter>"#;

@@ -33,28 +33,20 @@ const QUARTERS: [(f32, f32); 4] = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.
 #[test]
 fn bitmaps_lie_as_in_mitsuba() {
     let folder = folder();
-    for (more, want) in [
-        ("", [RED, GREEN, GREY, WHITE]),
-        (r#"<boolean name="raw" value="true"/>"#, [RED, GREEN, [128.0 / 255.0; 3], WHITE]),
-        (r#"<transform name="to_uv"><translate x="0.5"/></transform>"#, [GREEN, RED, WHITE, GREY]),
-        (r#"<transform name="to_uv"><translate y="0.5"/></transform>"#, [GREY, WHITE, RED, GREEN]),
-        (r#"<transform name="to_uv"><scale x="0.5"/></transform>"#, [RED, RED, GREY, GREY]),
-        (
-            r#"<transform name="to_uv"><translate x="1"/></transform>
-                <string name="wrap_mode" value="clamp"/>"#,
-            [GREEN, GREEN, WHITE, WHITE],
-        ),
-        (
-            r#"<transform name="to_uv"><translate x="1"/></transform>
-                <string name="wrap_mode" value="mirror"/>"#,
-            [GREEN, RED, WHITE, GREY],
-        ),
-        (
-            r#"<transform name="to_uv"><rotate z="1" angle="90"/></transform>
-                <string name="wrap_mode" value="repeat"/>"#,
-            [GREEN, WHITE, RED, GREY],
-        ),
+    let raw = value("boolean", "raw", true);
+    let [clamp, mirror, repeat] =
+        ["clamp", "mirror", "repeat"].map(|mode| value("string", "wrap_mode", mode));
+    for (to_uv, more, want) in [
+        ("", "", [RED, GREEN, GREY, WHITE]),
+        ("", raw.as_str(), [RED, GREEN, [128.0 / 255.0; 3], WHITE]),
+        (r#"<translate x="0.5"/>"#, "", [GREEN, RED, WHITE, GREY]),
+        (r#"<translate y="0.5"/>"#, "", [GREY, WHITE, RED, GREEN]),
+        (r#"<scale x="0.5"/>"#, "", [RED, RED, GREY, GREY]),
+        (r#"<translate x="1"/>"#, &clamp, [GREEN, GREEN, WHITE, WHITE]),
+        (r#"<translate x="1"/>"#, &mirror, [GREEN, RED, WHITE, GREY]),
+        (r#"<rotate z="1" angle="90"/>"#, &repeat, [GREEN, WHITE, RED, GREY]),
     ] {
+        let more = format!(r#"<transform name="to_uv">{to_uv}</transform>{more}"#);
         for ((u, v), want) in QUARTERS.into_iter().zip(want) {
             close(shine(&folder, &format!("{BITMAP}{more}"), u, v), want, 1e-3, &format!("{more} {u} {v}"));
         }

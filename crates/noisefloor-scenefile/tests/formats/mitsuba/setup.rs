@@ -1,4 +1,4 @@
-use crate::util::{CAMERA, Folder, SKY, assert_warns, close, fails, seen};
+use crate::util::{CAMERA, Folder, SKY, assert_warns, close, fails, of, seen, value};
 use noisefloor_ptwne::FovAxis;
 
 fn sensor(version: &str, inside: &str) -> Result<noisefloor_scenefile::Loaded, String> {
@@ -90,30 +90,23 @@ fn other_cameras_are_read_or_refused() {
 #[test]
 fn path_lengths_are_read() {
     let folder = Folder::new();
+    let integrator = |kind: &str, inside: &str| of("integrator", kind, inside);
+    let depth = |depth: i32| value("integer", "max_depth", depth);
+    let aovs = value("string", "aovs", "dd.y:depth");
     for (integrator, want) in [
-        ("", None),
-        (r#"<integrator type="path"/>"#, None),
-        (
-            r#"<integrator type="path"><integer name="max_depth" value="-1"/>
-                <integer name="rr_depth" value="3"/></integrator>"#,
-            None,
-        ),
-        (r#"<integrator type="path"><integer name="max_depth" value="7"/></integrator>"#, Some(7)),
-        (r#"<integrator type="volpath"><integer name="max_depth" value="1"/></integrator>"#, Some(1)),
-        (r#"<integrator type="direct"/>"#, Some(2)),
-        (
-            r#"<integrator type="aov"><string name="aovs" value="dd.y:depth"/><integrator type="path">
-                <integer name="max_depth" value="4"/></integrator></integrator>"#,
-            Some(4),
-        ),
+        (String::new(), None),
+        (integrator("path", ""), None),
+        (integrator("path", &(depth(-1) + &value("integer", "rr_depth", 3))), None),
+        (integrator("path", &depth(7)), Some(7)),
+        (integrator("volpath", &depth(1)), Some(1)),
+        (integrator("direct", ""), Some(2)),
+        (integrator("aov", &(aovs + &integrator("path", &depth(4)))), Some(4)),
     ] {
-        let loaded = folder.body(integrator).unwrap();
+        let loaded = folder.body(&integrator).unwrap();
         assert_eq!((loaded.max_depth, loaded.warnings.len()), (want, 0), "{integrator}");
     }
-    let zero = r#"<integrator type="path"><integer name="max_depth" value="0"/></integrator>"#;
-    fails(folder.body(zero), "line 2: `max_depth` is 0");
-    let other = folder.body(r#"<integrator type="ptracer"/>"#);
-    assert_eq!(other.unwrap().warnings.len(), 1);
+    fails(folder.body(&integrator("path", &depth(0))), "line 2: `max_depth` is 0");
+    assert_eq!(folder.body(&integrator("ptracer", "")).unwrap().warnings.len(), 1);
 }
 
 /// The camera sees through what shines, and black around the scene; mirrors and glass see both (Mitsuba 3.9.1).

@@ -615,12 +615,12 @@ fn colours_are_of_their_space() {
 fn textures_are_made_of_their_operands() {
     let folder = Folder::new();
     // A sky of 1 on what covers the picture; squares of 1/8 of it
-    let seen = |texture: &str| {
+    let mapped = SQUARE.replace("'point3 P'", "'point2 uv' [0 0 8 0 8 8 0 8] 'point3 P'");
+    let seen = |before: &str, texture: &str| {
         let text = format!(
             "LookAt 0 0 5 0 0 0 0 1 0 Camera 'orthographic' 'float screenwindow' [-1 1 -1 1]
-            Film 'rgb' 'integer xresolution' 8 'integer yresolution' 8 WorldBegin {SKY}{texture}
-            Material 'diffuse' 'texture reflectance' 't' {}",
-            SQUARE.replace("'point3 P'", "'point2 uv' [0 0 8 0 8 8 0 8] 'point3 P'")
+            Film 'rgb' 'integer xresolution' 8 'integer yresolution' 8 WorldBegin {SKY}{before}
+            Texture 't' 'spectrum' {texture} Material 'diffuse' 'texture reflectance' 't' {mapped}"
         );
         let loaded =
             folder.load_with(&text, &LoadOptions::default()).unwrap_or_else(|e| panic!("{texture}: {e}"));
@@ -629,64 +629,37 @@ fn textures_are_made_of_their_operands() {
         let mean: [f32; 3] = std::array::from_fn(|c| pixels.iter().map(|p| p[c]).sum::<f32>() / 64.0);
         (mean, warnings)
     };
-    let colour = "Texture 't' 'spectrum'";
-    for (texture, want) in [
-        (format!("{colour} 'checkerboard'"), [0.5; 3]),
-        (format!("{colour} 'checkerboard' 'rgb tex1' [.4 .4 .4]"), [0.2; 3]),
-        (format!("{colour} 'checkerboard' 'rgb tex2' [.4 .4 .4]"), [0.7; 3]),
-        (format!("{colour} 'mix' 'rgb tex2' [.4 .4 .4]"), [0.2; 3]),
-        (format!("{colour} 'mix' 'rgb tex1' [.4 .4 .4]"), [0.7; 3]),
-        (
-            format!(
-                "Texture 'a' 'float' 'constant' 'float value' .25
-                {colour} 'mix' 'texture amount' 'a' 'rgb tex1' [1 0 0] 'rgb tex2' [0 1 0]"
-            ),
-            [0.75, 0.25, 0.0],
-        ),
+    let share = "Texture 'a' 'float' 'constant' 'float value' .25\n";
+    let four = "Texture 'f' 'float' 'constant' 'float value' 4\n";
+    let two = "Texture 'a' 'spectrum' 'checkerboard' 'rgb tex1' [.8 .8 .8]\n";
+    let bright = &format!("{two}Texture 'b' 'spectrum' 'scale' 'texture tex' 'a' 'float scale' 4\n");
+    let colours = &format!(
+        "{share}Texture 'a' 'spectrum' 'constant' 'rgb value' [.9 .9 .9]
+        Texture 'c' 'spectrum' 'constant' 'rgb value' [.8 .8 .8]\n"
+    );
+    for (before, texture, want) in [
+        ("", "'checkerboard'", [0.5; 3]),
+        ("", "'checkerboard' 'rgb tex1' [.4 .4 .4]", [0.2; 3]),
+        ("", "'checkerboard' 'rgb tex2' [.4 .4 .4]", [0.7; 3]),
+        ("", "'mix' 'rgb tex2' [.4 .4 .4]", [0.2; 3]),
+        ("", "'mix' 'rgb tex1' [.4 .4 .4]", [0.7; 3]),
+        (share, "'mix' 'texture amount' 'a' 'rgb tex1' [1 0 0] 'rgb tex2' [0 1 0]", [0.75, 0.25, 0.0]),
         // By a picture: half of the squares are of one, half of the other
         (
-            format!(
-                "Texture 'a' 'float' 'checkerboard'
-                {colour} 'mix' 'texture amount' 'a' 'rgb tex1' [1 0 0] 'rgb tex2' [0 .5 0]"
-            ),
+            "Texture 'a' 'float' 'checkerboard'\n",
+            "'mix' 'texture amount' 'a' 'rgb tex1' [1 0 0] 'rgb tex2' [0 .5 0]",
             [0.5, 0.25, 0.0],
         ),
         // The factor is a float texture, also where a colour is called so
-        (
-            format!(
-                "Texture 'm' 'float' 'constant' 'float value' .25 Texture 'm' 'spectrum' 'constant' 'rgb value' [.9 .9 .9]
-                Texture 'c' 'spectrum' 'constant' 'rgb value' [.8 .8 .8]
-                {colour} 'scale' 'texture tex' 'c' 'texture scale' 'm'"
-            ),
-            [0.2; 3],
-        ),
-        (format!("{colour} 'scale' 'float scale' .3"), [0.3; 3]),
+        (colours, "'scale' 'texture tex' 'c' 'texture scale' 'a'", [0.2; 3]),
+        ("", "'scale' 'float scale' .3", [0.3; 3]),
         // Values above 1 are cut off where they reflect, not before
-        (
-            format!(
-                "Texture 'four' 'float' 'constant' 'float value' 4
-                {colour} 'scale' 'rgb tex' [.2 .1 .5] 'texture scale' 'four'"
-            ),
-            [0.8, 0.4, 1.0],
-        ),
-        (
-            format!(
-                "Texture 'two' 'spectrum' 'checkerboard' 'rgb tex1' [.8 .8 .8]
-                Texture 'four' 'spectrum' 'scale' 'texture tex' 'two' 'float scale' 4
-                {colour} 'scale' 'texture tex' 'four' 'float scale' .25"
-            ),
-            [0.4; 3],
-        ),
-        (
-            format!(
-                "Texture 'two' 'spectrum' 'checkerboard' 'rgb tex1' [.8 .8 .8]
-                {colour} 'scale' 'texture tex' 'two' 'float scale' 4"
-            ),
-            [0.5; 3],
-        ),
+        (four, "'scale' 'rgb tex' [.2 .1 .5] 'texture scale' 'f'", [0.8, 0.4, 1.0]),
+        (bright, "'scale' 'texture tex' 'b' 'float scale' .25", [0.4; 3]),
+        (two, "'scale' 'texture tex' 'a' 'float scale' 4", [0.5; 3]),
     ] {
-        let (got, warnings) = seen(&texture);
-        close(got, want, 1e-3, &texture);
+        let (got, warnings) = seen(before, texture);
+        close(got, want, 1e-3, texture);
         assert_eq!(warnings, 0, "{texture}");
     }
     fails(
