@@ -40,6 +40,10 @@ fn diffuse(inside: &str) -> String {
     of("diffuse", inside)
 }
 
+fn reflectance(tag: &str, value: &str) -> String {
+    diffuse(&format!("<{tag} name='reflectance' value='{value}'/>"))
+}
+
 fn of(kind: &str, inside: &str) -> String {
     bsdf(&format!("<bsdf type='{kind}'>{inside}</bsdf>"))
 }
@@ -113,27 +117,15 @@ fn unsupported_kinds_are_named() {
 #[test]
 fn bad_values_are_named() {
     all_fail(&[
-        (diffuse("<rgb name='reflectance' value='1 2'/>"), "line 3: 2 numbers; a colour has 1 or 3"),
-        (diffuse("<rgb name='reflectance' value='-1'/>"), "is negative or too large"),
-        (diffuse("<rgb name='reflectance' value='inf'/>"), "line 3: `inf` is not a finite number"),
+        (reflectance("rgb", "1 2"), "line 3: 2 numbers; a colour has 1 or 3"),
+        (reflectance("rgb", "-1"), "is negative or too large"),
+        (reflectance("rgb", "inf"), "line 3: `inf` is not a finite number"),
         (diffuse("<rgb name='reflectance'/>"), "line 3: `reflectance` has no value"),
-        (
-            diffuse("<string name='reflectance' value='red'/>"),
-            "line 3: `reflectance` is a <string>; expected <rgb>, <srgb>",
-        ),
-        (
-            diffuse("<srgb name='reflectance' value='#12345'/>"),
-            "line 3: `#12345` is not a colour like #80ff00",
-        ),
-        (diffuse("<srgb name='reflectance' value='#12345é'/>"), "is not a colour like #80ff00"),
-        (
-            diffuse("<srgb name='reflectance' value='#12345g'/>"),
-            "line 3: `#12345g` is not a colour like #80ff00",
-        ),
-        (
-            diffuse("<spectrum name='reflectance' value='500:0.1, 400:0.2'/>"),
-            "line 3: the wavelengths of a spectrum must rise",
-        ),
+        (reflectance("string", "red"), "line 3: `reflectance` is a <string>; expected <rgb>, <srgb>"),
+        (reflectance("srgb", "#12345"), "line 3: `#12345` is not a colour like #80ff00"),
+        (reflectance("srgb", "#12345é"), "is not a colour like #80ff00"),
+        (reflectance("srgb", "#12345g"), "line 3: `#12345g` is not a colour like #80ff00"),
+        (reflectance("spectrum", "500:0.1, 400:0.2"), "line 3: the wavelengths of a spectrum must rise"),
         (
             diffuse("<texture type='wood' name='reflectance'/>"),
             "line 3: <texture type=\"wood\" name=\"reflectance\"> is not supported",
@@ -211,43 +203,24 @@ fn links_do_not_lead_out() {
 fn warnings_say_what_is_left_out() {
     let folder = folder();
     for (body, want) in [
+        (mesh("obj", "flat.obj"), "2 of 3 faces have no area and are left out"),
+        (mesh("ply", "empty.ply"), "the mesh has no faces, as its file says"),
+        (mesh("obj", "curves.obj"), "line 5: `curv` of `curves.obj` is ignored"),
+        (move_by("<scale value='2' x='3'/>"), "the attribute `x` of <scale> is ignored"),
+        (bsdf("<float name='unheard_of' value='1'/>"), "<float name=\"unheard_of\"> is ignored"),
+        ("\n<volume type='grid'/>".to_owned(), "<volume type=\"grid\"> is ignored"),
         (
-            "<shape type='obj'><string name='filename' value='flat.obj'/></shape>",
-            "line 2: 2 of 3 faces have no area and are left out",
+            of("roughplastic", "<string name='distribution' value='phong'/>"),
+            "the distribution `phong` is replaced by `beckmann`",
         ),
         (
-            "<shape type='ply'><string name='filename' value='empty.ply'/></shape>",
-            "line 2: the mesh has no faces, as its file says",
-        ),
-        (
-            "<shape type='obj'><string name='filename' value='curves.obj'/></shape>",
-            "line 2: line 5: `curv` of `curves.obj` is ignored",
-        ),
-        (
-            "<shape type='cube'>\n<transform name='to_world'><scale value='2' x='3'/></transform></shape>",
-            "line 3: the attribute `x` of <scale> is ignored",
-        ),
-        (
-            "<shape type='cube'>\n<float name='unheard_of' value='1'/></shape>",
-            "line 3: <float name=\"unheard_of\"> is ignored",
-        ),
-        ("\n<volume type='grid'/>", "line 3: <volume type=\"grid\"> is ignored"),
-        (
-            "<shape type='cube'><bsdf type='roughplastic'><string name='distribution' value='phong'/></bsdf></shape>",
-            "line 2: the distribution `phong` is replaced by `beckmann`",
-        ),
-        (
-            "<shape type='cube'><bsdf type='dielectric'>\
-                <float name='specular_reflectance' value='0.5'/></bsdf></shape>",
-            "line 2: `specular_reflectance` [0.5, 0.5, 0.5] is ignored: it is 1",
+            of("dielectric", "<float name='specular_reflectance' value='0.5'/>"),
+            "`specular_reflectance` [0.5, 0.5, 0.5] is ignored: it is 1",
         ),
     ] {
-        let warnings = folder.body(body).unwrap_or_else(|e| panic!("{body}: {e}")).warnings;
-        let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-        assert!(
-            warnings.len() == 1 && warnings[0].ends_with(&format!("scene.xml: {want}")),
-            "{body}: {warnings:?}"
-        );
+        let warnings = folder.body(&body).unwrap_or_else(|e| panic!("{body}: {e}")).warnings;
+        let [warning] = warnings.as_slice() else { panic!("{body}: {warnings:?}") };
+        assert!(warning.to_string().ends_with(&format!("scene.xml: line 3: {want}")), "{warning}");
     }
     // As many as ten thousand
     let many = "<x/>\n".repeat(20_000);
