@@ -23,50 +23,22 @@ pub use page::{page, section};
 pub use pictures::{Crop, Pictures};
 pub use plots::{Cost, plot};
 pub use quality::Quality;
-pub use race::{CurvePoint, Entrant};
+pub use race::{Course, CurvePoint, Entrant};
 
-use crate::advance::Watch;
 use crate::error::LabError;
-use noisefloor::{Params, ProgressiveSource, Rgb};
+use noisefloor::ProgressiveSource;
 use noisefloor_denoise::Denoiser;
-use noisefloor_vision::VisionModel;
-use race::Course;
-use std::sync::atomic::AtomicBool;
 
-#[derive(Clone, Copy, Debug)]
-pub struct Setting<'a> {
-    /// Tiles, tone mapping, viewing conditions and the largest number of samples.
-    pub params: &'a Params,
-    /// Samples per pixel between two verdicts.
-    pub batch: u64,
-    /// The converged picture: linear radiance, row-major, as many pixels as the source renders.
-    pub reference: &'a [Rgb],
-    /// How far people are from the screen, for FLIP: pixels in a degree of their view.
-    pub pixels_per_degree: f64,
-}
-
-/// Lets the entrants watch one run of the source, and says what each took and left. Setting `cancel` ends
-/// the run after the batch that is under way. With a `denoiser`, every picture is also looked at denoised, without
+/// Lets the entrants watch one run of the source, and says what each took and left. With a `denoiser`, every picture is also looked at denoised, without
 /// albedo and normals.
 pub fn run(
     source: &mut dyn ProgressiveSource,
     entrants: Vec<Entrant>,
-    setting: Setting<'_>,
+    course: Course<'_>,
     labels: Labels,
     mut denoiser: Option<&mut dyn Denoiser>,
-    cancel: &AtomicBool,
-    watch: Watch<'_>,
 ) -> Result<(Comparison, Pictures), LabError> {
     let name = source.info().name;
-    let course = Course {
-        params: setting.params,
-        step: setting.batch.div_ceil(2),
-        truth: setting.reference,
-        pixels_per_degree: setting.pixels_per_degree,
-        vision: VisionModel::new(&setting.params.viewing),
-        cancel,
-        watch,
-    };
     let (race, yardstick) = course.run(source, entrants, &mut denoiser)?;
     let seen = race.entrants.iter().map(|entrant| pictures::Seen::new(entrant, &yardstick));
     let seen: Vec<pictures::Seen<'_>> = seen.collect::<Result<_, _>>()?;

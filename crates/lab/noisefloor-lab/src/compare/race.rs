@@ -147,16 +147,19 @@ impl CurvePoint {
 const SPACING: f64 = std::f64::consts::SQRT_2;
 
 /// What a run is made of.
-pub(super) struct Course<'a> {
-    pub(super) params: &'a Params,
-    /// Samples per pixel of a step.
-    pub(super) step: u64,
-    /// The converged picture: linear radiance, row-major.
-    pub(super) truth: &'a [Rgb],
-    pub(super) pixels_per_degree: f64,
-    pub(super) vision: VisionModel,
-    pub(super) cancel: &'a AtomicBool,
-    pub(super) watch: Watch<'a>,
+#[derive(Clone, Copy)]
+pub struct Course<'a> {
+    /// Tiles, tone mapping, viewing conditions and the largest number of samples.
+    pub params: &'a Params,
+    /// Samples per pixel between two verdicts.
+    pub batch: u64,
+    /// The converged picture: linear radiance, row-major, as many pixels as the source renders.
+    pub reference: &'a [Rgb],
+    /// How far people are from the screen, for FLIP: pixels in a degree of their view.
+    pub pixels_per_degree: f64,
+    /// Ends the run after the batch that is under way.
+    pub cancel: &'a AtomicBool,
+    pub watch: Watch<'a>,
 }
 
 impl Course<'_> {
@@ -180,13 +183,13 @@ impl Course<'_> {
             points: [0; 2],
             costs: Costs::new(grid.len()),
         };
-        field.show_converged(self.truth)?;
+        field.show_converged(self.reference)?;
         let mut yardstick: Option<Yardstick> = None;
         let mut curve: Vec<CurvePoint> = Vec::new();
         let (mut done, mut cancelled) = (0u64, false);
         while done < self.params.max_spp && field.open() > 0 {
             cancelled = self.cancel.load(Ordering::Relaxed);
-            let samples = (self.params.max_spp - done).min(self.step);
+            let samples = (self.params.max_spp - done).min(self.batch.div_ceil(2));
             // The end of a recording, or of somebody's patience
             if cancelled || !field.step(source, samples)? {
                 break;
@@ -227,10 +230,11 @@ impl Course<'_> {
 
     /// All judge by one way to the screen: that of the converged picture.
     fn settle(&self, field: &mut Field) -> Result<Yardstick, LabError> {
-        let display = self.params.tone_mapping.settle(self.truth);
+        let display = self.params.tone_mapping.settle(self.reference);
         field.entrants.iter_mut().try_for_each(|e| e.session.set_display(display.clone()))?;
-        let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision: self.vision.clone() };
-        Ok(Yardstick::new(field.film.grid(), display, self.truth.to_vec(), eye))
+        let vision = VisionModel::new(&self.params.viewing);
+        let eye = Eye { pixels_per_degree: self.pixels_per_degree, vision };
+        Ok(Yardstick::new(field.film.grid(), display, self.reference.to_vec(), eye))
     }
 }
 

@@ -12,7 +12,7 @@ use noisefloor_cli::signals::{AFTER_THIS_BATCH, INTERRUPTED, cancel_on_signal};
 use noisefloor_cli::sources::{Opened, Resources, SourceJob};
 use noisefloor_denoise::Denoiser;
 use noisefloor_lab::compare::{
-    self, AfterDenoising, Comparison, Converged, Cost, CriterionRun, Entrant, Labels, ReferenceJob, Setting,
+    self, AfterDenoising, Comparison, Converged, Cost, Course, CriterionRun, Entrant, Labels, ReferenceJob,
     render_reference,
 };
 use noisefloor_lab::{Advance, LabError};
@@ -122,16 +122,17 @@ fn one(
     let bars = Bars::new(job.quiet);
     let watch = |advance: Advance<'_>| bars.show(advance);
     let truth = converged(job, source_job, &folder, (width, height), cancel, &watch)?;
-    let setting = Setting {
+    let course = Course {
         params: &job.params,
         batch: job.batch,
         reference: &truth.pixels,
         pixels_per_degree: job.pixels_per_degree,
+        cancel,
+        watch: &watch,
     };
     let labels = Labels { scene, reference: truth.origin };
     let denoiser = denoiser.map(|denoiser| denoiser as &mut dyn Denoiser);
-    let (comparison, pictures) =
-        compare::run(source.as_mut(), entrants, setting, labels, denoiser, cancel, &watch)?;
+    let (comparison, pictures) = compare::run(source.as_mut(), entrants, course, labels, denoiser)?;
     bars.finish();
     comparison.warnings.iter().for_each(|warning| note!("warning: {warning}"));
 
