@@ -7,18 +7,11 @@ use noisefloor_study::explore::{ExploreServer, ExploreSetup};
 use std::net::SocketAddr;
 use tokio::runtime::Builder;
 
-/// What to serve, and where: checked.
-pub struct ExploreJob {
-    pub setup: ExploreSetup,
-    pub listen: SocketAddr,
-    pub allow_host: Vec<String>,
-}
-
-pub fn run(job: ExploreJob) -> anyhow::Result<()> {
-    let database = job.setup.database.clone();
+pub fn run((setup, listen, exposure): (ExploreSetup, SocketAddr, Exposure)) -> anyhow::Result<()> {
+    let database = setup.database.clone();
     let runtime = Builder::new_multi_thread().enable_all().build().context("no threads for the server")?;
     runtime.block_on(async {
-        let explorer = ExploreServer::bind(job.setup, job.listen, &Exposure::named(&job.allow_host)).await?;
+        let explorer = ExploreServer::bind(setup, listen, &exposure).await?;
         say!("open http://{} in a browser; Ctrl-C ends the server", explorer.address())?;
         say!("disagreements are stored in {}", database.display())?;
         explorer.run(interrupted()).await?;

@@ -7,6 +7,8 @@ use noisefloor_cli::options::layer::LayerArgs;
 use noisefloor_cli::options::oracle::OracleArgs;
 use noisefloor_cli::options::values;
 use noisefloor_cli::options::viewing::ViewingArgs;
+use noisefloor_pages::http::Exposure;
+use noisefloor_study::explore::ExploreSetup;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -61,10 +63,11 @@ pub struct ExploreArgs {
 }
 
 impl ExploreArgs {
-    pub fn check(self) -> anyhow::Result<crate::explore::ExploreJob> {
+    /// What to serve, and where.
+    pub fn check(self) -> anyhow::Result<(ExploreSetup, SocketAddr, Exposure)> {
         let Seen { oracle, viewing, audience } =
             self.eyes.look(&self.oracle, &self.viewing, self.audience)?;
-        let setup = noisefloor_study::explore::ExploreSetup {
+        let setup = ExploreSetup {
             model: oracle.model().clone(),
             people: oracle.people(),
             audience,
@@ -75,6 +78,6 @@ impl ExploreArgs {
             layer: self.layer.layer,
             pictures: self.images,
         };
-        Ok(crate::explore::ExploreJob { setup, listen: self.listen, allow_host: self.allow_host })
+        Ok((setup, self.listen, Exposure::named(&self.allow_host)))
     }
 }
