@@ -20,7 +20,6 @@ use axum::Router;
 use axum::response::Redirect;
 use axum::routing::{get, post};
 use noisefloor_pages::http::{self, Exposure, Listening};
-use std::fmt;
 use std::future::Future;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,13 +31,6 @@ pub struct StudyServer {
     listening: Listening,
     base_path: String,
     app: Arc<App>,
-}
-
-impl fmt::Debug for StudyServer {
-    // Neither the key nor answers belong into a log
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("StudyServer").field("listening", &self.listening).finish_non_exhaustive()
-    }
 }
 
 impl StudyServer {

@@ -113,8 +113,7 @@ impl Calibration {
     /// Begins; the oracle says what its observers see in these tiles. `None` if it does not tell noise from
     /// picture, or is for other viewing conditions.
     pub fn new(oracle: &Oracle, viewing: Viewing, seed: u64) -> Option<Self> {
-        let thresholds = CalibrationTile::all().iter().map(|tile| tile.threshold(oracle, viewing));
-        Some(Self::with(thresholds.collect::<Option<_>>()?, seed))
+        Some(Self::with(CalibrationTile::thresholds(oracle, viewing)?, seed))
     }
 
     /// Begins with known thresholds of the model's observers, one of each tile.

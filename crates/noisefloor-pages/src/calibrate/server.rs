@@ -21,7 +21,6 @@ use noisefloor::{Oracle, Viewing};
 use noisefloor_eyes::{Person, SeenDisplay};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -57,15 +56,6 @@ pub struct CalibrateSetup {
     pub keep: Keep,
 }
 
-impl fmt::Debug for CalibrateSetup {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("CalibrateSetup")
-            .field("name", &self.name)
-            .field("seed", &self.seed)
-            .finish_non_exhaustive()
-    }
-}
-
 struct App {
     setup: CalibrateSetup,
     state: Mutex<Progress>,
@@ -94,12 +84,6 @@ pub struct CalibrateServer {
     listening: Listening,
     app: Arc<App>,
     runtime: tokio::runtime::Runtime,
-}
-
-impl fmt::Debug for CalibrateServer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("CalibrateServer").field("address", &self.address()).finish_non_exhaustive()
-    }
 }
 
 impl CalibrateServer {

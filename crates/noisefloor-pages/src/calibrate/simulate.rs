@@ -18,8 +18,7 @@ pub struct SimulatedEyes {
 impl SimulatedEyes {
     /// Answers all trials of a calibration. `None` as for [`Calibration::new`].
     pub fn calibrate(&self, oracle: &Oracle, viewing: Viewing, seed: u64) -> Option<CalibrationStage> {
-        let thresholds = CalibrationTile::all().iter().map(|tile| tile.threshold(oracle, viewing));
-        let thresholds: Vec<f64> = thresholds.collect::<Option<_>>()?;
+        let thresholds = CalibrationTile::thresholds(oracle, viewing)?;
         Some(self.answer_all(Calibration::with(thresholds.clone(), seed), &thresholds, seed))
     }
 

@@ -125,6 +125,11 @@ impl CalibrationTile {
         Some(spp)
     }
 
+    /// That of each tile.
+    pub(super) fn thresholds(oracle: &Oracle, viewing: Viewing) -> Option<Vec<f64>> {
+        Self::all().iter().map(|tile| tile.threshold(oracle, viewing)).collect()
+    }
+
     fn told(&self, oracle: &Oracle, viewing: Viewing, spp: f64, seed: u64) -> Option<f64> {
         let still = |seed| Still::new((EDGE, EDGE), self.rendered(spp, seed), spp).displayed_as_it_is(0.0);
         let (one, other) = (still(seed), still(seed + 1));
