@@ -21,7 +21,7 @@ mod table;
 mod zone;
 
 pub use error::CorpusError;
-pub use levels::{Encoding, JudgedImage, JudgedImages, Patch, zone_levels};
+pub use levels::{Encoding, JudgedImage, JudgedImages, Patch};
 pub use table::ThresholdRow;
 pub use zone::{JudgedZone, ZoneImages};
 

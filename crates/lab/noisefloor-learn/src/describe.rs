@@ -31,20 +31,18 @@ const GRID: std::ops::Range<i32> = -4..20;
 /// choose.
 const REACH: f64 = 8.0;
 
-/// Folders with corpora, and which scenes belong together.
+/// Folders with corpora. Scenes belong together if their names begin with the same word; see [`first_word`].
 #[derive(Clone, Copy, Debug)]
 pub struct Corpora<'a> {
     pub folders: &'a [PathBuf],
-    /// The group of a scene, by its name: scenes of one group show the same room, and are left out together.
-    pub group_of: fn(&str) -> &str,
     /// On which display people saw the pictures, and from how far.
     pub viewing: Viewing,
 }
 
 impl<'a> Corpora<'a> {
-    /// Corpora whose scenes belong together if their names begin with the same word; see [`first_word`].
+    /// Corpora seen on the default display.
     pub fn new(folders: &'a [PathBuf]) -> Self {
-        Self { folders, group_of: first_word, viewing: Viewing::default() }
+        Self { folders, viewing: Viewing::default() }
     }
 }
 
@@ -102,10 +100,9 @@ fn describe(
             let describe = |(i, zone): (usize, &&JudgedZone)| {
                 let images: Vec<&Image> = images.iter().filter(|i| i.zone == zone.row.zone).collect();
                 let material = Material::of(zone, &images, references.as_ref().map(|r| &r[i]))?;
-                let group = (corpora.group_of)(&zone.row.scene);
                 let mut shown = levels(&of_scene, zone, &material)?;
                 shown.iter_mut().for_each(|(_, _, planes)| planes.viewing = corpora.viewing);
-                let (described, levels) = describe_zone(zone, group, shown, descriptor)?;
+                let (described, levels) = describe_zone(zone, shown, descriptor)?;
                 // A residual from what people compared with is what they saw
                 let seen = evidence == Evidence::Reference;
                 let reference_spp = if seen { f64::INFINITY } else { described.reference_spp };
@@ -144,7 +141,6 @@ pub(crate) struct Alone {
 /// A zone, of which the levels are still to come, and these.
 fn describe_zone(
     zone: &JudgedZone,
-    group: &str,
     shown: Vec<Shown>,
     descriptor: &Descriptor,
 ) -> Result<(Zone, Vec<Alone>), TableError> {
@@ -158,7 +154,7 @@ fn describe_zone(
     levels.sort_by(|a, b| a.spp.total_cmp(&b.spp));
     let zone = Zone {
         scene: zone.row.scene.clone(),
-        group: group.to_owned(),
+        group: first_word(&zone.row.scene).to_owned(),
         zone: zone.row.zone,
         human_spp: zone.row.human_spp,
         censored: zone.censored(),

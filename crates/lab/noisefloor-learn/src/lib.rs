@@ -39,7 +39,6 @@ pub use baselines::{constant_noise_baseline, scene_median_baseline};
 pub use choices::{Choice, VISIBLE_CHOICES, choices};
 pub use corpus::{
     Corpus, CorpusError, Encoding, JudgedImage, JudgedImages, JudgedZone, Patch, ThresholdRow, ZoneImages,
-    zone_levels,
 };
 pub use describe::{Corpora, combine, describe_corpora, describe_pairs};
 pub use error::TableError;

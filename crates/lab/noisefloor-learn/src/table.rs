@@ -159,10 +159,7 @@ impl Table {
 
     /// The groups of the answers, in alphabetical order.
     pub fn answer_groups(&self) -> Vec<&str> {
-        let mut groups: Vec<&str> = self.answers.iter().map(|a| a.group.as_str()).collect();
-        groups.sort_unstable();
-        groups.dedup();
-        groups
+        self.answers.iter().map(|a| a.group.as_str()).collect::<BTreeSet<_>>().into_iter().collect()
     }
 
     /// The groups, in alphabetical order.

@@ -77,13 +77,6 @@ struct Job<'a> {
     zones: Vec<&'a JudgedZone>,
 }
 
-/// Every real image of one zone, samples ascending. For all zones of a scene,
-/// [`Corpus::scene_levels`](crate::Corpus::scene_levels) decodes each shared image once instead of once a
-/// zone.
-pub fn zone_levels(zone: &JudgedZone) -> Result<JudgedImages<'_>, CorpusError> {
-    JudgedImages::of(&[zone])
-}
-
 impl<'a> JudgedImages<'a> {
     pub(super) fn of(zones: &[&'a JudgedZone]) -> Result<Self, CorpusError> {
         let mut jobs = VecDeque::new();
