@@ -227,11 +227,7 @@ impl ParticipantSession {
                 let share = moved / levels.len() as f64;
                 let [most, least] = CLICKED_SHARES;
                 let passed = if identical { share <= most } else { share >= least };
-                let same =
-                    |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { stack: s, .. } if *s == stack);
-                let repeat = self.outcomes.iter().filter(same).count() as u32;
-                let levels = levels.clone();
-                Ok((TrialOutcome::Stops { stack, repeat, levels, clicks: *clicks }, passed))
+                Ok((TrialOutcome::Stops { stack, levels: levels.clone(), clicks: *clicks }, passed))
             }
             (Some(Task::Validation { stack, pair, .. }), StudyEvent::Answer { choice, .. }) => {
                 let identical = match choice {

@@ -78,8 +78,6 @@ pub enum TrialOutcome {
     /// Acquisition: where the observer left each tile.
     Stops {
         stack: u32,
-        /// Which showing of it, from 0.
-        repeat: u32,
         /// Level of each tile.
         levels: Vec<u32>,
         clicks: u64,

@@ -72,7 +72,8 @@ fn each_pair_is_shown_twice_between_practice_and_catch_trials() {
     );
     let caught = |o: &&TrialOutcome| matches!(o, TrialOutcome::Caught { passed: true, .. });
     assert_eq!(session.outcomes().iter().filter(caught).count(), 2);
-    let stops = |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { levels, clicks: 2, repeat: 0 | 1, .. } if levels == &[1, 1]);
+    let stops =
+        |o: &&TrialOutcome| matches!(o, TrialOutcome::Stops { levels, clicks: 2, .. } if levels == &[1, 1]);
     assert_eq!(session.outcomes().iter().filter(stops).count(), 4);
 }
 
