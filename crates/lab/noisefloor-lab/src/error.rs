@@ -1,9 +1,6 @@
 //! Why an experiment failed.
 
-use noisefloor::{
-    SessionError, SourceError, criterion::CriterionError, film::FilmError, params::ParamsError,
-    tile::TileError,
-};
+use noisefloor::{SessionError, SourceError, film::FilmError, tile::TileError};
 use noisefloor_denoise::DenoiseError;
 use noisefloor_image::{PictureError, WriteError};
 use noisefloor_learn::{CorpusError, SvmTrainError, TableError};
@@ -20,10 +17,6 @@ pub enum LabError {
     Source(#[from] SourceError),
     #[error(transparent)]
     Session(#[from] SessionError),
-    #[error(transparent)]
-    Criterion(#[from] CriterionError),
-    #[error(transparent)]
-    Params(#[from] ParamsError),
     #[error(transparent)]
     Tile(#[from] TileError),
     #[error(transparent)]
