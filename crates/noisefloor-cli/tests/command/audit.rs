@@ -41,7 +41,7 @@ fn a_picture_stopped_too_early_fails_and_a_converged_one_passes() {
     assert_ne!(audit("5")["places"][0]["jods_lost"], audit("6")["places"][0]["jods_lost"]);
 
     let converged = folder.path().join("converged");
-    let said = succeed(&boxed(&converged, "spp:800", &["--audit", "2", "--check"]));
+    let said = succeed(&boxed(&converged, "spp:300", &["--audit", "2", "--check"]));
     assert!(said.contains("2 of 2 places keep the limit") && said.contains("at least 22 %"), "{said}");
 }
 
