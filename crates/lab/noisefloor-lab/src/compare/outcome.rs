@@ -45,6 +45,8 @@ pub struct Taken {
 pub struct AgainstUniform {
     /// By FLIP.
     pub uniform_over_this: Option<f64>,
+    /// The same by FLIP, in seconds of the source, over those of source and criterion.
+    pub uniform_over_this_seconds: Option<f64>,
     pub uniform_over_this_butteraugli: Option<f64>,
     pub uniform_over_this_cvvdp: Option<f64>,
 }
@@ -160,10 +162,11 @@ fn criterion_run(
     let spp_mean = film.total_samples() as f64 / (grid.width() * grid.height()) as f64;
     let quality = yardstick.quality(&film.image())?;
     // Between points of the curve
-    let over = |error: fn(&Quality) -> f64| {
+    let uniform = |error: fn(&Quality) -> f64| {
         let points = race.curve.iter().map(|point| (point.spp as f64, error(&point.quality)));
-        Some(crossing(&points.collect::<Vec<_>>(), error(&quality))? / spp_mean)
+        crossing(&points.collect::<Vec<_>>(), error(&quality))
     };
+    let over = |error| Some(uniform(error)? / spp_mean);
     let taken = Taken {
         scene: scene.into(),
         source: source.into(),
@@ -179,6 +182,8 @@ fn criterion_run(
     };
     let against = AgainstUniform {
         uniform_over_this: over(|q| q.flip_worst),
+        uniform_over_this_seconds: uniform(|q| q.flip_worst)
+            .map(|spp| spp * race.tile_seconds.iter().sum::<f64>() / taken.seconds()),
         uniform_over_this_butteraugli: over(|q| q.butteraugli_worst),
         uniform_over_this_cvvdp: over(|q| 10.0 - q.cvvdp_jod_worst),
     };
