@@ -5,6 +5,7 @@ use noisefloor_sidecar::find;
 use noisefloor_testkit::{HANG, Noise, Requirement, require, require_python};
 use std::path::Path;
 use std::process::Stdio;
+use std::time::Duration;
 use tempfile::tempdir;
 
 #[test]
@@ -68,6 +69,40 @@ fn the_denoised_picture_and_its_error_are_written() {
 
     let said = run(&["doctor"]);
     assert!(String::from_utf8(said.stdout).unwrap().lines().any(|line| line.starts_with("oidn ")));
+}
+
+/// Killed at random moments and resumed, a render ends as an undisturbed one does, and knows what was found of
+/// tiles that had stopped before.
+#[test]
+fn killed_denoised_renders_lose_nothing() {
+    if require(Requirement::Renderers, find(&OIDN)).is_none() {
+        return;
+    }
+    let [whole, killed] = [tempdir().unwrap(), tempdir().unwrap()];
+    let arguments = |out: &Path, more: &[&str]| -> Vec<String> {
+        let args = ["render", "--size", "64x64", "--tile", "32", "--denoise", "oidn", "--lost", "0.02"];
+        let rest = ["--max-spp", "700", "--threads", "1", "--quiet", "--autosave", "0.1", "--out", text(out)];
+        args.iter().chain(&rest).chain(more).map(|word| (*word).to_owned()).collect()
+    };
+    succeed(&arguments(whole.path(), &[]));
+    let resume = arguments(killed.path(), &["--resume"]);
+    let saved = killed.path().join("checkpoint.nfc");
+    let last_save = || std::fs::metadata(&saved).and_then(|file| file.modified()).ok();
+    let mut cut = 0;
+    for wait in [0, 150, 400] {
+        let before = last_save();
+        let mut child = command(&resume).stderr(Stdio::null()).spawn().unwrap();
+        while last_save() == before && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(Duration::from_millis(wait));
+        cut += usize::from(child.try_wait().unwrap().is_none());
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    assert!(cut > 0, "the render was done before it was killed, each time");
+    succeed(&resume);
+    assert_same_pictures(killed.path(), whole.path());
 }
 
 #[test]
